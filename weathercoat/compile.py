@@ -1,0 +1,36 @@
+"""`kernel`: how every compiled function of the package is declared, and where its machine code is kept.
+
+Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the cache folder is
+keyed by a hash of the package's sources; Numba itself keys by CPU. The folder lies in the user's cache directory, so
+that a package which is installed read-only caches as well; `NUMBA_CACHE_DIR` overrides it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+
+def cache_folder() -> Path:
+    """The folder for compiled kernels: one for each state of the package's sources."""
+    package = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    base = os.environ.get("XDG_CACHE_HOME") or (Path.home() / ".cache")
+    return Path(base) / "weathercoat" / f"kernels-{digest.hexdigest()[:16]}"
+
+
+if "NUMBA_CACHE_DIR" not in os.environ:
+    os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
+
+import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile `function` at its first call: cached on disk, IEEE arithmetic, division without a Python check."""
+    return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]

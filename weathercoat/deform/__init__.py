@@ -1,0 +1,1 @@
+"""Position-based deformation: length, angle and substrate constraints, and the sweeps over them."""

@@ -1,0 +1,194 @@
+"""One family of errors; each class owns its exit code and its remedy.
+
+An error is one line: what went wrong, where, and what to do. The command line prints it as
+`weathercoat: FILE: CODE: what, where, what to do` and ends with `exit_code`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class WeathercoatError(Exception):
+    """Base of every error that a user can meet.
+
+    `code` is the stable message code, `exit_code` the exit code of the process, `remedy` the general advice
+    that is printed where the message itself gives none.
+    """
+
+    code = "E-INTERNAL"
+    exit_code = 70
+    remedy = "report this, with the command and the input"
+
+    def __init__(self, message: str, *, file: str | None = None, remedy: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        if remedy is not None:
+            self.remedy = remedy
+
+    def line(self) -> str:
+        """The whole message on one line, without the program's name."""
+        where = f"{self.file}: " if self.file else ""
+        return " ".join(f"{where}{self.code}: {self.message}; {self.remedy}".split())
+
+
+class UsageError(WeathercoatError):
+    """The command line asks for something that does not exist or does not go together."""
+
+    code = "E-USAGE"
+    exit_code = 2
+    remedy = "see --help"
+
+
+class ConfigError(WeathercoatError):
+    """The config is not valid."""
+
+    code = "E-CONFIG"
+    exit_code = 2
+    remedy = "see `weathercoat config new` for a commented example"
+
+
+class ModelError(WeathercoatError):
+    """The model cannot be read."""
+
+    exit_code = 3
+
+
+class AccessError(ModelError):
+    """The model's file is missing, no regular file, or may not be read."""
+
+    code = "E-ACCESS"
+    remedy = "give the path of a readable model file"
+
+
+class EmptyFileError(ModelError):
+    """The file has no bytes."""
+
+    code = "E-EMPTY"
+    remedy = "export the model again"
+
+
+class FormatError(ModelError):
+    """The content is of no supported format."""
+
+    code = "E-FORMAT"
+    remedy = "supported: OBJ, PLY, STL, OFF, GLB, glTF, and what meshio reads"
+
+
+class CorruptError(ModelError):
+    """The file contradicts itself: truncated, miscounted, or with indices out of range."""
+
+    code = "E-CORRUPT"
+    remedy = "export the model again"
+
+
+class MissingFileError(ModelError):
+    """A file that the model needs is missing."""
+
+    code = "E-MISSING"
+    remedy = "put the missing file beside the model"
+
+
+class SecurityError(ModelError):
+    """The model refers to the network or to a path outside its folder."""
+
+    code = "E-SECURITY"
+    remedy = "put every file beside the model, or embed it"
+
+
+class UnsupportedError(ModelError):
+    """A valid file uses a feature that is not supported."""
+
+    code = "E-UNSUPPORTED"
+    remedy = "export the model without it"
+
+
+class SurfaceError(WeathercoatError):
+    """The model was read but holds no usable surface."""
+
+    exit_code = 4
+
+
+class NoFacesError(SurfaceError):
+    """The model has points or lines only."""
+
+    code = "E-NOFACES"
+    remedy = "export the model with its faces"
+
+
+class NoAreaError(SurfaceError):
+    """All faces are without area."""
+
+    code = "E-NOAREA"
+    remedy = "export a model whose faces have an area"
+
+
+class NonFiniteError(SurfaceError):
+    """All of the surface has positions that are not finite."""
+
+    code = "E-NONFINITE"
+    remedy = "export the model again"
+
+
+class PrecisionError(SurfaceError):
+    """Positions are so far from the origin that their digits no longer resolve the shape."""
+
+    code = "E-PRECISION"
+    remedy = "move the model to the origin before exporting"
+
+
+class ScaleError(SurfaceError):
+    """Positions are so large or small that areas overflow or vanish."""
+
+    code = "E-SCALE"
+    remedy = "scale the model to a sensible unit"
+
+
+class StrictError(SurfaceError):
+    """A warning under --strict."""
+
+    code = "E-STRICT"
+    remedy = "repair the model, or run without --strict"
+
+
+class LimitError(WeathercoatError):
+    """A limit of size, faces, memory or time."""
+
+    code = "E-LIMIT"
+    exit_code = 5
+    remedy = "raise the limit or ask for less"
+
+
+class CheckError(WeathercoatError):
+    """The tool's own result failed its checks; nothing was written."""
+
+    code = "E-CHECK"
+    exit_code = 6
+
+
+class OutputError(WeathercoatError):
+    """The output cannot be written, or exists."""
+
+    code = "E-OUTPUT"
+    exit_code = 7
+    remedy = "choose another folder with -o"
+
+
+class OutputExistsError(OutputError):
+    """The output exists."""
+
+    code = "E-EXISTS"
+    remedy = "choose another folder with -o, or give --overwrite"
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something that was repaired, dropped or cannot be kept; listed in `run.json` and on standard error.
+
+    `code` is stable (`W-...`), `count` the number of elements it concerns.
+    """
+
+    code: str
+    count: int
+    message: str

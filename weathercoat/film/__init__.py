@@ -1,0 +1,1 @@
+"""The paint film: its state, and how it separates, fractures and flakes."""

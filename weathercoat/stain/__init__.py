@@ -1,0 +1,1 @@
+"""Stains: dust, runoff rust, substrate rust, and the colours they give."""
