@@ -1,0 +1,501 @@
+"""The config: every parameter of the method, typed, bounded and described.
+
+Lengths are in *sizes* (the square root of the rest area), times in *ages*, forces in units of the drying tension
+that an intact film tends to, so one config fits an asset of any scale. A parameter carries its unit and, where the
+paper names one, its symbol; documentation, the commented example and the JSON Schema are rendered from here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic.fields import FieldInfo
+
+VERSION = 1
+LARGEST_SEED = 2**63 - 1
+
+
+def _refuse_text_and_bool(value: object) -> object:
+    """Pydantic would read true as 1 and "3" as 3; a config that says so is a mistake."""
+    if isinstance(value, bool | str):
+        raise ValueError("must be a number")
+    return value
+
+
+def _at_least_one_word(value: object) -> object:
+    return (value,) if isinstance(value, str) else value
+
+
+def _parse_color(value: object) -> tuple[int, ...]:
+    if isinstance(value, str) and re.fullmatch(r"#[0-9a-fA-F]{6}", value):
+        return tuple(int(value[i : i + 2], 16) for i in (1, 3, 5))
+    if isinstance(value, list | tuple) and len(value) == 3:
+        channels = tuple(value)
+        if all(isinstance(c, int) and not isinstance(c, bool) and 0 <= c <= 255 for c in channels):
+            return channels
+    raise ValueError('must be "#rrggbb" (in quotes) or three whole numbers from 0 to 255')
+
+
+def _parse_up(value: object) -> object:
+    if isinstance(value, str) and value in get_args(Axis):
+        return value
+    if isinstance(value, list | tuple) and len(value) == 3:
+        numbers = [c for c in value if isinstance(c, int | float) and not isinstance(c, bool)]
+        if len(numbers) == 3 and all(abs(c) <= 1e100 for c in numbers) and any(numbers):
+            return tuple(float(c) for c in numbers)
+    raise ValueError("must be auto, x, y, z, -x, -y, -z or three numbers that are not all 0")
+
+
+def _parse_remesh(value: object) -> object:
+    """Off and on as YAML 1.1 reads them (booleans) and as YAML 1.2 does (words)."""
+    if value is False or value in ("off", "no"):
+        return False
+    if value is True or value in ("on", "yes"):
+        return {}
+    return value
+
+
+def _remesh_tag(value: object) -> str:
+    return "off" if value is False else "mapping"
+
+
+Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
+Real = Annotated[float, BeforeValidator(_refuse_text_and_bool), Field(allow_inf_nan=False)]
+Whole = Annotated[int, BeforeValidator(_refuse_text_and_bool)]
+Names = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_at_least_one_word),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+Color = Annotated[
+    tuple[int, int, int],
+    BeforeValidator(_parse_color),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
+                {
+                    "type": "array",
+                    "items": {"type": "integer", "minimum": 0, "maximum": 255},
+                    "minItems": 3,
+                    "maxItems": 3,
+                },
+            ]
+        }
+    ),
+]
+
+
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    symbol: str = "",
+    alias: str | None = None,
+    **bounds: Any,
+) -> Any:
+    """A field with its unit, the paper's symbol where it has one, and bounds (`gt`, `ge`, `lt`, `le`)."""
+    extra: Any = {name: text for name, text in (("unit", unit), ("symbol", symbol)) if text}
+    return Field(default, description=description, alias=alias, json_schema_extra=extra or None, **bounds)
+
+
+class Section(BaseModel):
+    """A part of the config: immutable, and without unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+
+class Model(Section):
+    """How the model is taken in."""
+
+    up: Annotated[Axis | tuple[float, float, float], BeforeValidator(_parse_up)] = parameter(
+        "auto", "The direction against gravity in the model's axes; auto follows the convention of its format"
+    )
+
+
+class Paint(Section):
+    """Which parts carry paint, by names or globs of material groups or objects; others pass through untouched."""
+
+    only: Names = parameter((), "Groups that carry paint; empty means all")
+    excluded: Names = parameter((), "Groups that carry none, taken from the ones above", alias="except")
+
+
+class Remesh(Section):
+    """Remeshing into homogeneous, random triangles; `remesh: off` uses the model's own triangles."""
+
+    faces: Whole = parameter(10_000, "Wanted number of faces", ge=4, le=20_000_000)
+    crease_angle: Real = parameter(
+        30.0, "Edges that bend by more than this are kept as creases", unit="degrees", gt=0, le=180
+    )
+
+
+class Ageing(Section):
+    """The time that a run covers. Rates are per age, so steps set accuracy and cost, not the paint."""
+
+    steps: Whole = parameter(
+        1000, "Number of steps that the run is divided into", symbol="N", ge=1, le=10_000_000
+    )
+    duration: Real = parameter(1.0, "Age that the run covers", unit="ages", gt=0, le=1000)
+
+
+class Tension(Section):
+    """The drying tension of the film."""
+
+    law: Literal["saturating", "linear"] = parameter(
+        "saturating",
+        "Saturating tends to 1, as drying stress does; linear grows without a cap (the paper)",
+        symbol="T",
+    )
+    initial: Real = parameter(0.0, "Tension at the start, at most 1 where it saturates", ge=0, le=1000)
+    rate: Real = parameter(
+        3.0,
+        "Saturating: share of the missing tension gained; linear: tension gained",
+        unit="per age",
+        ge=0,
+        le=1e6,
+    )
+
+
+class Adhesion(Section):
+    """What holds the film to the metal: a base with improved Perlin noise on it, falling with age."""
+
+    base: Real = parameter(1.0, "Mean at the start", symbol="A", ge=0, le=1e6)
+    amplitude: Real = parameter(0.5, "Amplitude of the noise", ge=0, le=1e6)
+    wavelength: Real = parameter(0.25, "Wavelength of the coarsest octave", unit="sizes", ge=1e-4, le=1000)
+    octaves: Whole = parameter(3, "Octaves of noise, each of half the wavelength before", ge=1, le=16)
+    gain: Real = parameter(0.5, "Amplitude of an octave relative to the one before", ge=0, le=1)
+    decay_rate: Real = parameter(
+        1.0, "Share of the base that is lost, not below 0", unit="per age", ge=0, le=1e6
+    )
+
+
+class Cohesion(Section):
+    """The bond across an edge, within the film."""
+
+    base: Real = parameter(1.5, "Mean at the start", symbol="C", gt=0, le=1e6)
+    scatter: Real = parameter(0.2, "Largest relative deviation from edge to edge", ge=0, lt=1)
+    decay_rate: Real = parameter(
+        0.3,
+        "Exponential loss in the half-edges of a face that has a broken edge",
+        unit="per age",
+        ge=0,
+        le=1e6,
+    )
+
+
+class Defects(Section):
+    """Edges that are weak from the start, where cracks begin."""
+
+    rule: Literal["per_area", "share"] = parameter(
+        "per_area", "Number by area, whatever the mesh, or a share of the edges (the paper)"
+    )
+    density: Real = parameter(100.0, "Defects with the rule per_area", unit="per size squared", ge=0, le=1e8)
+    share: Real = parameter(0.01, "Share of the edges with the rule share", ge=0, le=1)
+    strength: Real = parameter(0.001, "Cohesion of a defect relative to the others", ge=0, le=1)
+
+
+class Lift(Section):
+    """The force that peels a vertex off the metal (eq. 1)."""
+
+    coefficient: Real = parameter(
+        0.3, "Lift per tension: how easily the film separates", symbol="k", ge=0, le=1e6
+    )
+    convexity: Real = parameter(2.0, "How much more a ridge lifts than a valley", symbol="a", ge=0, le=100)
+    sum: Literal["per_valence", "plain"] = parameter(
+        "per_valence", "Lift on a vertex: scaled to six half-edges, or their plain sum (the paper)"
+    )
+    tension: Literal["drying", "face"] = parameter(
+        "drying", "Tension that lifts: before relaxation by cracks, or the face's own (the paper)"
+    )
+
+
+class Fracture(Section):
+    """How separated film breaks along edges, and how a break relaxes its neighbourhood."""
+
+    direction_threshold: Real = parameter(
+        0.45,
+        "Least cosine between a crack's direction and an edge that continues it",
+        symbol="α",
+        gt=0,
+        lt=1,  # noqa: RUF001
+    )
+    direction_factor: Real = parameter(
+        0.20, "Factor on the cohesion of an edge that continues a crack", symbol="β", gt=0, lt=1
+    )
+    relaxation: Literal["shear_lag", "faces"] = parameter(
+        "shear_lag", "A break unloads the film around it, or only its two faces (the paper)"
+    )
+    shear_lag: Real = parameter(
+        0.04, "Length over which a free edge unloads the film", unit="sizes", symbol="λ", gt=0, le=1
+    )
+    face_factor: Real = parameter(
+        0.5, "Factor on the tension of both faces with the relaxation faces", ge=0, lt=1
+    )
+    rounds: Literal["by_speed", "one"] = parameter(
+        "by_speed", "Rounds of breaking in a step: as many as the crack speed allows, or one (the paper)"
+    )
+    speed: Real = parameter(20.0, "Speed at which cracks run", unit="sizes per age", gt=0, le=1e6)
+
+
+class Flaking(Section):
+    """What falls off."""
+
+    rule: Literal["islands", "faces"] = parameter(
+        "islands", "Whole pieces that nothing holds any more, or single faces (the paper)"
+    )
+    hanging_share: Real = parameter(
+        0.05, "A piece also falls when less than this share of its outline still hangs", ge=0, lt=1
+    )
+
+
+class Curl(Section):
+    """How the target angles of separated film shrink with the age since separation."""
+
+    rule: Literal["curvature", "angle"] = parameter(
+        "curvature", "A curvature of the paint, or an angle per edge (the paper)"
+    )
+    radius: Real = parameter(0.08, "Radius that the film curls to", unit="sizes", ge=1e-5, le=1e5)
+    rate: Real = parameter(4.0, "Rate at which the curvature grows", unit="per age", ge=0, le=1e6)
+    angle_rate: Real = parameter(
+        0.8, "Fall of the target with the rule angle", unit="radians per age", symbol="φ₀", ge=0, le=1e6
+    )
+    angle_floor: Real = parameter(
+        2.6, "Smallest target with the rule angle; π is flat", unit="radians", gt=0, lt=math.pi
+    )
+
+
+class Deformation(Section):
+    """Position-based deformation (section 4)."""
+
+    sweeps: Whole = parameter(10, "Passes over all constraints in a step", ge=0, le=100_000)
+    angle: Literal["dihedral", "split", "arccos"] = parameter(
+        "dihedral", "Angle constraint: signed dihedral, the paper's split form, or plain arccos"
+    )
+    angle_stiffness: Real = parameter(1.0, "Share of an angle correction that is applied", ge=0, le=1)
+
+
+class Dust(Section):
+    """Dust that settles low, on upward faces and in valleys."""
+
+    rate: Real = parameter(0.5, "Growth where all terms are 1", unit="per age", ge=0, le=1e6)
+
+
+class Rust(Section):
+    """Rust that runs down from cracks, and rust of the metal."""
+
+    threshold: Real = parameter(0.1, "Rust above which it runs on and colours", ge=0, lt=1)
+    source_rate: Real = parameter(3.0, "Growth at the lower outline of cracks", unit="per age", ge=0, le=1e6)
+    source_cap: Real = parameter(0.9, "Rust that such a source tends to", ge=0, le=1)
+    runoff_speed: Real = parameter(1.0, "Speed at which rust runs down", unit="sizes per age", ge=0, le=1e6)
+    runoff_length: Real = parameter(0.15, "Length over which a streak fades", unit="sizes", gt=0, le=1000)
+    alignment: Real = parameter(0.7, "Least cosine between gravity and an edge that rust follows", ge=0, lt=1)
+    side_share: Real = parameter(
+        0.001, "Share that goes to neighbours other than the best aligned", ge=0, le=1
+    )
+    lifted_rate: Real = parameter(1.0, "Rust of the metal under lifted film", unit="per age", ge=0, le=1e6)
+    bare_rate: Real = parameter(3.0, "Rust of bare metal", unit="per age", ge=0, le=1e6)
+
+
+class Appearance(Section):
+    """Colours (sRGB) and the drawn thickness of the film."""
+
+    paint: Color = parameter((58, 120, 134), "Outer side of the film")
+    back: Color = parameter((188, 178, 160), "Inner side of the film, the primer")
+    metal: Color = parameter((122, 124, 126), "Metal without rust")
+    rust: Color = parameter((132, 51, 0), "Rust")
+    dust: Color = parameter((172, 156, 130), "Dust")
+    thickness: Real = parameter(
+        0.003, "Thickness of the film in meshes and pictures", unit="sizes", ge=0, le=0.1
+    )
+
+
+class Snapshots(Section):
+    """When film and metal are recorded: a number of times, or explicit steps."""
+
+    count: Whole | None = parameter(
+        5,
+        "Number of snapshots, evenly spaced over the run and ending with it; not together with steps",
+        ge=1,
+        le=100_000,
+    )
+    steps: tuple[Annotated[Whole, Field(ge=0)], ...] = parameter(
+        (), "The steps to record instead, in rising order; 0 is the start"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _count_or_steps(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        if not data.get("steps"):
+            return {key: value for key, value in data.items() if key != "count" or value is not None}
+        if data.get("count") is not None:
+            raise ValueError("give count or steps, not both")
+        return {**data, "count": None}
+
+    @model_validator(mode="after")
+    def _rising(self) -> Snapshots:
+        if any(later <= earlier for earlier, later in zip(self.steps, self.steps[1:], strict=False)):
+            raise ValueError("steps must rise")
+        return self
+
+    def due(self, steps: int) -> tuple[int, ...]:
+        """The steps to record in a run of `steps` steps, rising; fewer than `count` where the run is shorter."""
+        if self.count is None:
+            return self.steps
+        return tuple(sorted({-(-steps * (i + 1) // self.count) for i in range(self.count)}))
+
+
+class Output(Section):
+    """What a run writes."""
+
+    formats: Annotated[
+        tuple[Literal["ply", "glb"], ...],
+        BeforeValidator(_at_least_one_word),
+        Field(min_length=1),
+    ] = parameter(("ply", "glb"), "Formats of the snapshots' meshes")
+    preview: bool = parameter(True, "Whether a contact sheet of all snapshots is drawn")
+    picture_width: Whole = parameter(640, "Width of a picture", unit="pixels", ge=16, le=16_384)
+    picture_height: Whole = parameter(480, "Height of a picture", unit="pixels", ge=16, le=16_384)
+
+
+RemeshOrOff = Annotated[
+    Annotated[Remesh, Tag("mapping")]
+    | Annotated[Literal[False], Tag("off"), WithJsonSchema({"enum": [False, True, "off", "on"]})],
+    Discriminator(_remesh_tag),
+    BeforeValidator(_parse_remesh),
+]
+
+
+class Config(Section):
+    """One run of weathercoat. `remesh` is false where the model's own triangles are used."""
+
+    version: Literal[1] = parameter(VERSION, "Version of this schema")
+    preset: Names = parameter(
+        (), "Shipped configs whose values come before those of the file, the last one winning"
+    )
+    seed: Whole = parameter(1, "Seed of every random number", ge=0, le=LARGEST_SEED)
+    model: Model = Model()
+    paint: Paint = Paint()
+    remesh: RemeshOrOff = Remesh()
+    ageing: Ageing = Ageing()
+    tension: Tension = Tension()
+    adhesion: Adhesion = Adhesion()
+    cohesion: Cohesion = Cohesion()
+    defects: Defects = Defects()
+    lift: Lift = Lift()
+    fracture: Fracture = Fracture()
+    flaking: Flaking = Flaking()
+    curl: Curl = Curl()
+    deformation: Deformation = Deformation()
+    dust: Dust = Dust()
+    rust: Rust = Rust()
+    appearance: Appearance = Appearance()
+    snapshots: Snapshots = Snapshots()
+    output: Output = Output()
+
+    def conflicts(self) -> list[tuple[str, str]]:
+        """Values that are valid each but do not go together: (key, what is wrong)."""
+        found = []
+        if self.tension.law == "saturating" and self.tension.initial > 1:
+            found.append(("tension.initial", "must be at most 1, the cap of the saturating law"))
+        if self.snapshots.steps and self.snapshots.steps[-1] > self.ageing.steps:
+            last, end = self.snapshots.steps[-1], self.ageing.steps
+            found.append(("snapshots.steps", f"step {last} is after the end, ageing.steps is {end}"))
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """The resolved values under the file's keys, as plain lists, numbers and text; loads back the same."""
+        return self.model_dump(mode="json", by_alias=True)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One key of the config: `key` is dotted; `kind` says what it accepts, bounds included."""
+
+    key: str
+    default: Any
+    description: str
+    kind: str
+    unit: str
+    symbol: str
+
+
+def section_of(field: FieldInfo) -> type[Section] | None:
+    """The section that a field holds, or None where it is a parameter."""
+    for kind in (field.annotation, *get_args(field.annotation)):
+        while get_origin(kind) is Annotated:
+            kind = get_args(kind)[0]
+        if isinstance(kind, type) and issubclass(kind, Section):
+            return kind
+    return None
+
+
+def parameters(section: type[Section] = Config, prefix: str = "") -> Iterator[Parameter]:
+    """Every parameter below `section`, in the order of the schema."""
+    for name, field in section.model_fields.items():
+        key = prefix + (field.alias or name)
+        inner = section_of(field)
+        if inner is not None:
+            yield from parameters(inner, key + ".")
+            continue
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        yield Parameter(
+            key=key,
+            default=field.default,
+            description=field.description or "",
+            kind=_describe_kind(field.annotation) + _describe_bounds(field),
+            unit=str(extra.get("unit", "")),
+            symbol=str(extra.get("symbol", "")),
+        )
+
+
+def _describe_kind(kind: Any) -> str:
+    """What a parameter of the type `kind` accepts, in words."""
+    origin, inner = get_origin(kind), [part for part in get_args(kind) if part is not type(None)]
+    if origin is Annotated:
+        return _describe_kind(inner[0])
+    if kind == get_args(Color)[0]:
+        return '"#rrggbb" or [r, g, b]'
+    if origin is Literal:
+        return ", ".join(map(str, inner))
+    if origin is tuple:
+        return (
+            f"list of {_describe_kind(inner[0])}"
+            if Ellipsis in inner
+            else f"three {_describe_kind(inner[0])}s"
+        )
+    if inner:
+        return " or ".join(map(_describe_kind, inner))
+    return {bool: "true, false", int: "whole number", float: "number", str: "names"}[kind]
+
+
+def _describe_bounds(field: FieldInfo) -> str:
+    words = ""
+    for bound in field.metadata:
+        for kind, name, word in (
+            (Gt, "gt", "above"),
+            (Ge, "ge", "from"),
+            (Lt, "lt", "below"),
+            (Le, "le", "to"),
+        ):
+            if isinstance(bound, kind):
+                value = getattr(bound, name)
+                words += f" {word} " + (f"{int(value):,}" if value == int(value) else f"{value:.4g}")
+    return words
