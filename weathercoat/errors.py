@@ -32,6 +32,10 @@ class WeathercoatError(Exception):
         where = f"{self.file}: " if self.file else ""
         return " ".join(f"{where}{self.code}: {self.message}; {self.remedy}".split())
 
+    def lines(self) -> list[str]:
+        """The message as it is printed: one line for each problem."""
+        return [self.line()]
+
 
 class UsageError(WeathercoatError):
     """The command line asks for something that does not exist or does not go together."""
@@ -41,12 +45,50 @@ class UsageError(WeathercoatError):
     remedy = "see --help"
 
 
+@dataclass(frozen=True)
+class ConfigProblem:
+    """One thing that is wrong in a config.
+
+    `where` is a file, `preset NAME` or `--set`; `line` counts from 1, 0 for none; `key` is dotted, or empty.
+    """
+
+    where: str
+    line: int
+    key: str
+    what: str
+
+    def place(self) -> str:
+        """`FILE:LINE`, or what stands for it."""
+        return f"{self.where}:{self.line}" if self.line else self.where
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.place(), self.key, self.what) if part)
+
+
 class ConfigError(WeathercoatError):
-    """The config is not valid."""
+    """The config is not valid; `problems` holds all that is wrong with it, where it was read from a file."""
 
     code = "E-CONFIG"
     exit_code = 2
     remedy = "see `weathercoat config new` for a commented example"
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        file: str | None = None,
+        remedy: str | None = None,
+        problems: tuple[ConfigProblem, ...] = (),
+    ) -> None:
+        super().__init__(message or " | ".join(map(str, problems)), file=file, remedy=remedy)
+        self.problems = problems
+
+    def lines(self) -> list[str]:
+        """One line for each problem, with its file and line where other errors have their file."""
+        if not self.problems:
+            return super().lines()
+        keyed = ((p.place(), f"{p.key}: {p.what}" if p.key else p.what) for p in self.problems)
+        return [" ".join(f"{place}: {self.code}: {what}".split()) for place, what in keyed]
 
 
 class ModelError(WeathercoatError):

@@ -1,8 +1,8 @@
 """The config: every parameter of the method, typed, bounded and described.
 
-Lengths are in *sizes* (the square root of the rest area), times in *ages*, forces in units of the drying tension
-that an intact film tends to, so one config fits an asset of any scale. A parameter carries its unit and, where the
-paper names one, its symbol; documentation, the commented example and the JSON Schema are rendered from here.
+Lengths are in *sizes* (the square root of the rest area), times in *ages*, forces in units of the drying
+tension that an intact film tends to, so one config fits an asset of any scale. A parameter carries its unit
+and, where the paper names one, its symbol; docs, commented example and JSON Schema come from here.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class Model(Section):
 
 
 class Paint(Section):
-    """Which parts carry paint, by names or globs of material groups or objects; others pass through untouched."""
+    """Which parts carry paint, by names or globs of material groups or objects; others pass through."""
 
     only: Names = parameter((), "Groups that carry paint; empty means all")
     excluded: Names = parameter((), "Groups that carry none, taken from the ones above", alias="except")
@@ -231,9 +231,9 @@ class Fracture(Section):
     direction_threshold: Real = parameter(
         0.45,
         "Least cosine between a crack's direction and an edge that continues it",
-        symbol="α",
+        symbol="α",  # noqa: RUF001
         gt=0,
-        lt=1,  # noqa: RUF001
+        lt=1,
     )
     direction_factor: Real = parameter(
         0.20, "Factor on the cohesion of an edge that continues a crack", symbol="β", gt=0, lt=1
@@ -356,7 +356,7 @@ class Snapshots(Section):
         return self
 
     def due(self, steps: int) -> tuple[int, ...]:
-        """The steps to record in a run of `steps` steps, rising; fewer than `count` where the run is shorter."""
+        """The steps to record in a run of `steps` steps, rising; fewer than `count` in a shorter run."""
         if self.count is None:
             return self.steps
         return tuple(sorted({-(-steps * (i + 1) // self.count) for i in range(self.count)}))
@@ -421,7 +421,7 @@ class Config(Section):
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """The resolved values under the file's keys, as plain lists, numbers and text; loads back the same."""
+        """The resolved values under the file's keys, as plain lists, numbers and text."""
         return self.model_dump(mode="json", by_alias=True)
 
 
