@@ -83,6 +83,11 @@ class ConfigError(WeathercoatError):
         super().__init__(message or " | ".join(map(str, problems)), file=file, remedy=remedy)
         self.problems = problems
 
+    @classmethod
+    def at(cls, where: str, what: str, *, line: int = 0) -> ConfigError:
+        """The error of a single problem that concerns no key."""
+        return cls(problems=(ConfigProblem(where, line, "", what),))
+
     def lines(self) -> list[str]:
         """One line for each problem, with its file and line where other errors have their file."""
         if not self.problems:

@@ -1,7 +1,7 @@
 """YAML with line numbers, read as version 1.2 means it.
 
-PyYAML follows YAML 1.1, where `off` is a boolean, `1e-3` is text and `1:30` is ninety. Here only true and false
-are booleans and every usual spelling of a number is a number. Nothing is executed, and neither nesting nor
+PyYAML follows YAML 1.1, where `off` is a boolean, `1e-3` is text and `1:30` is ninety. Here only true and
+false are booleans and every usual spelling of a number is a number. Nothing is executed, and neither nesting nor
 aliases can make a small file large.
 """
 
@@ -49,19 +49,15 @@ for _name, _pattern in (
 
 
 def read_document(data: bytes, where: str) -> dict[str, Item]:
-    """The mapping that a YAML file holds, empty for comments alone. Raises `ConfigError` with all problems."""
+    """The mapping that a YAML file holds, empty for comments alone. Raises `ConfigError`."""
     if len(data) > LARGEST_FILE:
-        raise ConfigError(
-            problems=(
-                ConfigProblem(where, 0, "", f"larger than {LARGEST_FILE // 1024} KiB, this is no config"),
-            )
-        )
+        raise ConfigError.at(where, f"larger than {LARGEST_FILE // 1024} KiB, this is no config")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         what = f"byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        raise ConfigError(problems=(ConfigProblem(where, line, "", what),)) from None
+        raise ConfigError.at(where, what, line=line) from None
     node = _compose(text, where)
     reader = _Reader(where)
     value = None if node is None else reader.read(node, "")
@@ -92,13 +88,13 @@ def _compose(text: str, where: str) -> yaml.Node | None:
         what = error.problem or error.context or "not valid YAML"
         if "'\\t'" in what:
             what = "a tab indents this line; use spaces"
-        raise ConfigError(problems=(ConfigProblem(where, mark.line + 1 if mark else 0, "", what),)) from None
+        raise ConfigError.at(where, what, line=mark.line + 1 if mark else 0) from None
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         what = f"character U+{ord(text[error.position]):04X} is not allowed in YAML"
-        raise ConfigError(problems=(ConfigProblem(where, line, "", what),)) from None
+        raise ConfigError.at(where, what, line=line) from None
     except RecursionError:
-        raise ConfigError(problems=(ConfigProblem(where, 0, "", "nested too deeply"),)) from None
+        raise ConfigError.at(where, "nested too deeply") from None
 
 
 class _Reader:

@@ -1,6 +1,6 @@
 """Loading a config: shipped presets, then the user's file, then `--set`; where each value came from is kept.
 
-All problems are found before anything is refused: `ConfigError.problems` has one for each, with file, line and key.
+All problems are found at once: `ConfigError.problems` has one for each, with file, line and key.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from weathercoat.config.document import LARGEST_FILE, Item, read_document, read_value
+from weathercoat.config.document import LARGEST_FILE, Item, read_document, read_value, without_lines
 from weathercoat.config.presets import preset_names, preset_path
 from weathercoat.config.schema import Config, Section, parameters, section_of
 from weathercoat.errors import ConfigError, ConfigProblem
@@ -117,28 +117,24 @@ def _preset_layer(name: str) -> _Layer:
 
 def _read_file(source: str) -> bytes:
     try:
-        if not stat.S_ISREG(os.stat(source).st_mode):
-            raise ConfigError(
-                problems=(ConfigProblem(source, 0, "", "not a regular file; give a YAML file"),)
-            )
-        with open(source, "rb") as file:
+        if not stat.S_ISREG(Path(source).stat().st_mode):
+            raise ConfigError.at(source, "not a regular file; give a YAML file")
+        with Path(source).open("rb") as file:
             return file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
         what = f"no such file, and no shipped config of that name; there are {', '.join(preset_names())}"
         near = _did_you_mean(source, preset_names())
-        raise ConfigError(problems=(ConfigProblem(source, 0, "", what + near),)) from None
+        raise ConfigError.at(source, what + near) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise ConfigError(problems=(ConfigProblem(source, 0, "", f"cannot be read: {reason}"),)) from None
+        raise ConfigError.at(source, f"cannot be read: {reason}") from None
 
 
 def _override_layer(override: str | Override) -> _Layer:
     if isinstance(override, str):
         key, sign, text = override.partition("=")
         if not sign or not all(key.split(".")):
-            raise ConfigError(
-                problems=(ConfigProblem("--set", 0, "", f"{override!r} must be key.path=value"),)
-            )
+            raise ConfigError.at("--set", f"{override!r} must be key.path=value")
         override = Override(key, read_value(text, "--set", key))
     item = Item(override.value, 0)
     for name in reversed(override.key.split(".")):
@@ -171,6 +167,7 @@ class _Merge:
             if item is not None and isinstance(item.value, dict) and any(key in item.value for key in keys):
                 for key in keys:
                     self.values.get(section, {}).pop(key, None)
+                    self.origins.pop((section, key), None)
         self._add(self.values, layer.values, (), layer.where)
 
     def _add(self, target: dict[str, Any], items: dict[str, Item], above: KeyPath, where: str) -> None:
@@ -191,7 +188,7 @@ class _Merge:
             if item.value is None and path != ("snapshots", "count"):
                 self._report(path, "has no value" + _color_hint(path))
                 continue
-            target[name] = _without_lines(item.value)
+            target[name] = without_lines(item.value)
 
     def origin_of(self, path: KeyPath) -> _Origin | None:
         """Where the value at `path` was given, or the thing that it is a part of; None for a default."""
@@ -211,7 +208,7 @@ class _Merge:
             for key, what in config.conflicts():
                 self._report(tuple(key.split(".")), what)
         if self.problems:
-            raise ConfigError(problems=tuple(self.problems))
+            raise ConfigError(problems=tuple(sorted(self.problems, key=lambda p: (p.where, p.line))))
         return config
 
     def _report(self, path: KeyPath, what: str) -> None:
@@ -294,10 +291,11 @@ def _nearest_key(path: KeyPath) -> str:
     symbol = _SPELLED_SYMBOLS.get(name, name)
     known = list(parameters())
     by_symbol = [parameter.key for parameter in known if parameter.symbol == symbol]
-    by_name = [parameter.key for parameter in known if parameter.key.rpartition(".")[2] == name]
-    if by_symbol or by_name:
-        return f"; did you mean {(by_symbol or by_name)[0]}?"
-    return _did_you_mean(".".join(path), [parameter.key for parameter in known])
+    if by_symbol:
+        return f"; did you mean {by_symbol[0]}?"
+    by_name = {parameter.key.rpartition(".")[2]: parameter.key for parameter in reversed(known)}
+    near = difflib.get_close_matches(name, by_name, 1)
+    return f"; did you mean {by_name[near[0]]}?" if near else ""
 
 
 def _did_you_mean(word: Any, candidates: Iterable[str]) -> str:
@@ -307,9 +305,3 @@ def _did_you_mean(word: Any, candidates: Iterable[str]) -> str:
 
 def _color_hint(path: KeyPath) -> str:
     return '; put a colour in quotes: "#rrggbb"' if path[0] == "appearance" else ""
-
-
-def _without_lines(value: Any) -> Any:
-    return (
-        {key: _without_lines(item.value) for key, item in value.items()} if isinstance(value, dict) else value
-    )
