@@ -1,0 +1,217 @@
+"""The folder of a run: it appears at its place whole or not at all, and reads back for `render`.
+
+What lies in it:
+
+    run.json        config, versions, inputs, notes and figures; the same bytes for the same input and seed
+    timing.json     seconds by stage; the only file that differs from run to run
+    preview.png     contact sheet over time
+    snapshots/      step_0100.ply and step_0100.glb for each recorded step
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+from weathercoat.errors import AccessError, CorruptError, FormatError, OutputError, OutputExistsError
+from weathercoat.output.snapshots import read_snapshot_ply
+from weathercoat.sim.snapshot import Snapshot
+
+REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
+LONGEST_NAME = 255
+DEVICE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO}
+
+
+class RunFolder:
+    """Context manager that gives a temporary folder, which becomes `target` when the block ends well.
+
+    The temporary folder lies beside the target, hence on its file system, and is removed on any exception. An
+    existing target is refused with OutputExistsError before any work; with `overwrite` it is replaced at the
+    end, and only if it is the folder of a run, or empty. OutputError where the target cannot be written, also
+    for a write that fails inside the block because the disk is full. A process that is killed outright leaves
+    `.weathercoat-*.partial` beside the target.
+    """
+
+    def __init__(self, target: Path | str, *, overwrite: bool = False) -> None:
+        self.target = _resolved(target)
+        self.overwrite = overwrite
+        self._check_target()
+        self._check_parent()
+
+    def __enter__(self) -> Path:
+        self.path = _aside(self.target)
+        with _output_errors(self.target):
+            self.path.mkdir()
+        return self.path
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if error is None:
+                self._put_in_place()
+            elif isinstance(error, OSError) and self._is_about_output(error):
+                raise OutputError(_reason(error), file=str(self.target)) from error
+        finally:
+            shutil.rmtree(self.path, ignore_errors=True)
+
+    def _check_target(self) -> None:
+        if not os.path.lexists(self.target):
+            return
+        if not self.target.is_dir():
+            raise OutputError("is a file, not a folder", file=str(self.target))
+        if not self.overwrite:
+            raise OutputExistsError("the folder exists", file=str(self.target))
+        with _output_errors(self.target):
+            is_run = (self.target / REPORT).is_file() or not any(self.target.iterdir())
+        if not is_run:
+            raise OutputError(
+                f"holds no {REPORT}, so it is not overwritten",
+                file=str(self.target),
+                remedy="choose another folder",
+            )
+
+    def _check_parent(self) -> None:
+        parent = self.target.parent
+        if not parent.is_dir():
+            raise OutputError(f"there is no folder {parent}", file=str(self.target), remedy="create it first")
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise OutputError(f"the folder {parent} is not writable", file=str(self.target))
+
+    def _is_about_output(self, error: OSError) -> bool:
+        inside = isinstance(error.filename, str) and Path(error.filename).is_relative_to(self.path)
+        return inside or error.errno in DEVICE_ERRORS
+
+    def _put_in_place(self) -> None:
+        """Rename the whole folder to the target; what was there goes only once the new one is in place."""
+        self._check_target()
+        old = _aside(self.target)
+        with _output_errors(self.target):
+            exists = self.target.is_dir()
+            if exists:
+                self.target.rename(old)
+            try:
+                self.path.rename(self.target)
+            except BaseException:
+                if exists:
+                    old.rename(self.target)
+                raise
+        shutil.rmtree(old, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[BinaryIO]:
+    """A binary stream that becomes the file `target` when the block ends without an error.
+
+    A device or pipe is written directly. Raises OutputExistsError for a file that exists, unless `overwrite`,
+    and OutputError where the target cannot be written, also for a full disk inside the block.
+    """
+    path = _resolved(target)
+    if path.is_dir():
+        raise OutputError("is a folder", file=str(path), remedy="give the name of a file")
+    if os.path.lexists(path) and not path.is_file():
+        with _output_errors(path), path.open("wb") as stream:
+            yield stream
+        return
+    if path.is_file() and not overwrite:
+        raise OutputExistsError(
+            "the file exists", file=str(path), remedy="choose another, or give --overwrite"
+        )
+    aside = _aside(path)
+    try:
+        with _output_errors(path):
+            with aside.open("xb") as stream:
+                yield stream
+            aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def safe_name(text: str, suffix: str = "") -> str:
+    """A file name made of any text, such as the stem of a model's path, followed by `suffix`.
+
+    Keeps letters, digits and marks of all scripts and ` -_.+`; everything else becomes `_`, and leading dots
+    and dashes go. At most 255 bytes in UTF-8: longer text is cut, and a hash of the whole keeps names apart.
+    """
+    normal = unicodedata.normalize("NFC", text)
+    kept = "".join(c if unicodedata.category(c)[0] in "LNM" or c in " -_.+" else "_" for c in normal)
+    name = kept.strip(" .-") or "model"
+    room = LONGEST_NAME - len(suffix.encode())
+    if len(name.encode()) > room:
+        digest = "-" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
+        name = name.encode()[: room - len(digest)].decode("utf-8", "ignore") + digest
+    return name + suffix
+
+
+def snapshot_stem(step: int, steps: int) -> str:
+    """Name of a snapshot's files without extension; sorted by name they are in order of time."""
+    return f"step_{step:0{max(4, len(str(steps)))}d}"
+
+
+def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
+    """Report and snapshots of a finished run, in order of time.
+
+    Raises AccessError where there is no such folder or report, CorruptError where the report is broken,
+    FormatError where the run wrote no PLY snapshots, and what `read_snapshot_ply` raises.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise AccessError(
+            "there is no such folder", file=str(folder), remedy="give the folder of a finished run"
+        )
+    try:
+        text = (folder / REPORT).read_bytes()
+    except OSError as error:
+        reason = f"{REPORT}: {error.strerror}"
+        raise AccessError(reason, file=str(folder), remedy="give the folder of a finished run") from error
+    try:
+        report = json.loads(text)
+    except ValueError as error:
+        raise CorruptError("no valid JSON", file=str(folder / REPORT), remedy="run again") from error
+    if not isinstance(report, dict):
+        raise CorruptError("no JSON object", file=str(folder / REPORT), remedy="run again")
+    snapshots = [read_snapshot_ply(file) for file in sorted((folder / SNAPSHOTS).glob("*.ply"))]
+    if not snapshots:
+        raise FormatError(
+            "the run holds no PLY snapshots", file=str(folder), remedy="run again with PLY output"
+        )
+    return report, sorted(snapshots, key=lambda snapshot: snapshot.step)
+
+
+def _resolved(target: Path | str) -> Path:
+    """The target with links followed, so that what a link points to is replaced and not the link."""
+    try:
+        path = Path(os.path.realpath(target))
+        os.lstat(path)
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        raise OutputError(_reason(error), file=str(target)[:100]) from error
+    return path
+
+
+def _aside(target: Path) -> Path:
+    """A new hidden name beside the target, short whatever the target's name."""
+    return target.parent / f".weathercoat-{secrets.token_hex(6)}.partial"
+
+
+@contextlib.contextmanager
+def _output_errors(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(_reason(error), file=str(target)) from error
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error) or "cannot be written"

@@ -1,0 +1,187 @@
+"""Snapshots as files: film and metal in one PLY, which reads back, and in one GLB for viewers.
+
+Film that still holds lies exactly on the metal, and a renderer that sees both at one depth shows a random mix
+of them. So files hold the film where it is, and the metal set in a hair along its normals: the surface of a
+painted part is the paint, and the metal lies beneath it. Removing film never has to move anything.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.errors import FormatError
+from weathercoat.mesh.surface import Surface, Vectors, face_areas, vertex_normals
+from weathercoat.output.glb import Material, Part, srgb_to_linear, surface_parts, write_glb
+from weathercoat.output.ply import PlyArrays, color_bytes, read_ply_arrays, write_ply
+from weathercoat.sim.snapshot import Snapshot
+
+# Depth of the metal under the film, in sizes (square root of the area): some twenty steps of a 24-bit depth
+# buffer whose near plane is a hundredth of the object away, and a third of an edge at a million faces.
+HAIR = 5e-4
+SUBSTRATE, FILM = 0, 1
+TITLE = "weathercoat snapshot 1"
+PAINT = Material("paint", metallic=0.0, roughness=0.5, double_sided=True)
+METAL = Material("metal", metallic=0.2, roughness=0.8, double_sided=True)
+
+
+def write_snapshot_ply(folder: Path | str, snapshot: Snapshot, stem: str) -> Path:
+    """Write `folder`/`stem`.ply, film and metal in one file, and return its path.
+
+    Properties of a vertex: position (double), normal, colour (sRGB bytes), and the scalars part (0 metal, 1
+    film), rust, dust, separated, adhesion, separation_age, bare, origin (number of the metal's vertex, which
+    for the metal is its own). Of a face: part, and origin (number of the metal's face). The metal comes first
+    and lies a hair under the film; what does not apply to it is 0. Scalars are 32-bit floats. Raises OSError
+    where the file cannot be written.
+    """
+    path = Path(folder) / f"{stem}.ply"
+    metal, film = len(snapshot.substrate_vertices), len(snapshot.film_vertices)
+    depth = hair(snapshot)
+    film_normals = vertex_normals(snapshot.film_vertices, snapshot.film_faces)
+    no_value = np.zeros(metal)
+    write_ply(
+        path,
+        np.concatenate([set_in(snapshot, depth), snapshot.film_vertices]),
+        np.concatenate([snapshot.substrate_faces, snapshot.film_faces + metal]),
+        normals=np.concatenate([snapshot.substrate_normals, film_normals]),
+        colors=color_bytes(np.concatenate([snapshot.substrate_color, snapshot.film_color])),
+        scalars={
+            "part": np.repeat(np.array([SUBSTRATE, FILM], np.uint8), [metal, film]),
+            "rust": _floats(snapshot.substrate_rust, snapshot.film_rust),
+            "dust": _floats(snapshot.dust, snapshot.dust[snapshot.film_origin]),
+            "separated": np.concatenate([np.zeros(metal, np.bool_), snapshot.separated]),
+            "adhesion": _floats(no_value, snapshot.adhesion),
+            "separation_age": _floats(no_value, snapshot.separation_age),
+            "bare": np.concatenate([snapshot.bare, np.zeros(film, np.bool_)]),
+            "origin": np.concatenate([np.arange(metal, dtype=np.int32), snapshot.film_origin]).astype(
+                np.int32
+            ),
+        },
+        face_scalars={
+            "part": np.repeat(
+                np.array([SUBSTRATE, FILM], np.uint8),
+                [len(snapshot.substrate_faces), len(snapshot.film_faces)],
+            ),
+            "origin": np.concatenate(
+                [np.arange(len(snapshot.substrate_faces), dtype=np.int32), snapshot.film_face]
+            ).astype(np.int32),
+        },
+        comments=(
+            TITLE,
+            f"step {snapshot.step}",
+            f"age {float(snapshot.age)!r}",
+            f"hair {depth!r}",
+            "part 0 is the metal, set in by the hair along its normals; part 1 is the film",
+        ),
+    )
+    return path
+
+
+def read_snapshot_ply(path: Path | str) -> Snapshot:
+    """Read a snapshot that `write_snapshot_ply` wrote.
+
+    The film's positions come back exactly, the metal's to round-off, scalars and normals as 32-bit floats,
+    colours as bytes. Raises AccessError, FormatError or CorruptError.
+    """
+    ply = read_ply_arrays(path)
+    try:
+        return _unpack(ply)
+    except (KeyError, ValueError, IndexError) as error:
+        raise FormatError(
+            "no snapshot of weathercoat", file=str(path), remedy="give the folder of a finished run"
+        ) from error
+
+
+def write_snapshot_glb(
+    path: Path | str,
+    snapshot: Snapshot,
+    *,
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+    untouched: Surface | None = None,
+) -> None:
+    """Write a snapshot as GLB: the nodes `film`, `substrate`, and one for each group of `untouched`.
+
+    The film is a double-sided sheet and the metal lies a hair beneath it. Colours are linear; the scalars are
+    the attributes _RUST, _DIRT, _SEPARATED, _ADHESION, _SEPARATION_AGE of the film and _RUST, _DIRT, _BARE of
+    the metal. `up` is the model's axis against gravity. Raises OSError where the file cannot be written.
+    """
+    film = Part(
+        "film",
+        PAINT,
+        snapshot.film_vertices,
+        snapshot.film_faces,
+        vertex_normals(snapshot.film_vertices, snapshot.film_faces),
+        srgb_to_linear(snapshot.film_color),
+        scalars={
+            "_RUST": snapshot.film_rust,
+            "_DIRT": snapshot.dust[snapshot.film_origin],
+            "_SEPARATED": snapshot.separated,
+            "_ADHESION": snapshot.adhesion,
+            "_SEPARATION_AGE": snapshot.separation_age,
+        },
+    )
+    substrate = Part(
+        "substrate",
+        METAL,
+        set_in(snapshot, hair(snapshot)),
+        snapshot.substrate_faces,
+        snapshot.substrate_normals,
+        srgb_to_linear(snapshot.substrate_color),
+        scalars={"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
+    )
+    others = [] if untouched is None else surface_parts(untouched)
+    write_glb(
+        path,
+        [film, substrate, *others],
+        up=up,
+        extras={"step": int(snapshot.step), "age": float(snapshot.age)},
+    )
+
+
+def hair(snapshot: Snapshot) -> float:
+    """Depth of the metal under the film in files, in units of the model."""
+    return float(HAIR * np.sqrt(face_areas(snapshot.substrate_vertices, snapshot.substrate_faces).sum()))
+
+
+def set_in(snapshot: Snapshot, depth: float) -> Vectors:
+    """Positions of the metal, (n, 3), moved inwards by `depth`."""
+    return snapshot.substrate_vertices - depth * snapshot.substrate_normals
+
+
+def _floats(metal: Vectors, film: Vectors) -> NDArray[np.float32]:
+    return np.concatenate([metal, film]).astype(np.float32)
+
+
+def _unpack(ply: PlyArrays) -> Snapshot:
+    """The snapshot in a file's arrays; KeyError, ValueError or IndexError where it is none."""
+    if ply.comments[0] != TITLE:
+        raise ValueError(ply.comments[0])
+    facts = dict(comment.split(" ", 1) for comment in ply.comments[1:])
+    metal = int(np.sum(ply.vertex["part"] == SUBSTRATE))
+    metal_faces = int(np.sum(ply.face["part"] == SUBSTRATE))
+    positions = ply.vectors("x", "y", "z")
+    normals = ply.vectors("nx", "ny", "nz").astype(np.float64)
+    colors = ply.vectors("red", "green", "blue") / 255.0
+    rust = ply.vertex["rust"].astype(np.float64)
+    return Snapshot(
+        step=int(facts["step"]),
+        age=float(facts["age"]),
+        film_vertices=positions[metal:],
+        film_faces=ply.faces[metal_faces:] - np.int32(metal),
+        film_face=ply.face["origin"][metal_faces:],
+        film_origin=ply.vertex["origin"][metal:],
+        film_rust=rust[metal:],
+        separated=ply.vertex["separated"][metal:] != 0,
+        separation_age=ply.vertex["separation_age"][metal:].astype(np.float64),
+        adhesion=ply.vertex["adhesion"][metal:].astype(np.float64),
+        film_color=colors[metal:],
+        substrate_vertices=positions[:metal] + float(facts["hair"]) * normals[:metal],
+        substrate_normals=normals[:metal],
+        substrate_faces=ply.faces[:metal_faces],
+        substrate_rust=rust[:metal],
+        dust=ply.vertex["dust"][:metal].astype(np.float64),
+        bare=ply.vertex["bare"][:metal] != 0,
+        substrate_color=colors[:metal],
+    )
