@@ -1,0 +1,127 @@
+"""Where a picture is taken from: one camera that frames the substrate, the same for every frame of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.mesh.surface import Vectors
+
+_HALF_ANGLE = np.radians(13.0)  # of the picture's shorter side: a long lens, which keeps plates from looking warped
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera.
+
+    position, right, up, forward: float64 (3,), the last three an orthonormal frame, in the model's units.
+    tangent_x, tangent_y: tangents of half the angle of view across and down the picture.
+    """
+
+    position: Vectors
+    right: Vectors
+    up: Vectors
+    forward: Vectors
+    tangent_x: float
+    tangent_y: float
+
+    def directions(self, rows: NDArray[np.int64], width: int, height: int) -> NDArray[np.float32]:
+        """Unit directions through the centres of all pixels of some `rows` of a picture, (len(rows) * width, 3)."""
+        x = ((np.arange(width) + 0.5) / width * 2.0 - 1.0) * self.tangent_x
+        y = (1.0 - (rows + 0.5) / height * 2.0) * self.tangent_y
+        direction = self.forward + x[None, :, None] * self.right + y[:, None, None] * self.up
+        direction /= np.linalg.norm(direction, axis=2, keepdims=True)
+        return direction.reshape(-1, 3).astype(np.float32)
+
+
+def make_camera(
+    vertices: Vectors,
+    normals: Vectors,
+    up: tuple[float, float, float],
+    *,
+    aspect: float,
+    azimuth: float,
+    elevation: float,
+    margin: float,
+) -> Camera:
+    """The camera that sees all `vertices`, as near as the `margin` (a share of the picture's half size) allows.
+
+    An object is seen from `azimuth` and `elevation` [degrees]: azimuth 0 is its front (+z where y is up, -y where z is
+    up), positive azimuths lie to its right. A plate, open or closed, is seen from its normal side, turned by the same
+    angles, so that its curls show.
+    """
+    upward = _unit(np.asarray(up, np.float64))
+    front = _front(upward)
+    facing = _facing(normals, upward + front)
+    if facing is not None:
+        backward = _turned_from(facing, upward, front, azimuth, elevation)
+    else:
+        side = np.cross(upward, front)
+        a, e = np.radians(azimuth), np.radians(elevation)
+        backward = np.cos(e) * (np.cos(a) * front + np.sin(a) * side) + np.sin(e) * upward
+    forward = -backward
+    level = upward if abs(forward @ upward) < 0.999 else -front * np.sign(forward @ upward)
+    right = _unit(np.cross(forward, level))
+    upright = np.cross(right, forward)
+    tangent = np.tan(_HALF_ANGLE)
+    tangent_x, tangent_y = (tangent * aspect, tangent) if aspect >= 1.0 else (tangent, tangent / aspect)
+    position = _fit(vertices, right, upright, forward, tangent_x * (1.0 - margin), tangent_y * (1.0 - margin))
+    return Camera(position, right, upright, forward, float(tangent_x), float(tangent_y))
+
+
+def _unit(vector: Vectors) -> Vectors:
+    return vector / np.linalg.norm(vector)  # type: ignore[no-any-return]
+
+
+def _facing(normals: Vectors, preferred: Vectors) -> Vectors | None:
+    """The direction that most of a plate's surface faces (`preferred` decides between two sides); None if it is no plate."""
+    if len(normals) == 0:
+        return None
+    share, axes = np.linalg.eigh(normals.T @ normals / len(normals))
+    if share[2] < 0.7:
+        return None
+    axis = axes[:, 2]
+    mean = float(axis @ normals.mean(axis=0))
+    return axis if (mean if abs(mean) > 0.3 else axis @ preferred) > 0.0 else -axis
+
+
+def _front(upward: Vectors) -> Vectors:
+    """The horizontal direction that counts as the front."""
+    guess = np.array([0.0, -1.0, 0.0]) if abs(upward[2]) > 0.9 else np.array([0.0, 0.0, 1.0])
+    return _unit(guess - (guess @ upward) * upward)
+
+
+def _turned_from(facing: Vectors, upward: Vectors, front: Vectors, azimuth: float, elevation: float) -> Vectors:
+    """Direction to the viewer of a surface that faces `facing`: three-quarter, from above where it stands upright."""
+    steep = abs(facing @ upward)
+    if steep > 0.9:
+        # Lying flat: from the front, high enough that the surface is not foreshortened away.
+        a, e = np.radians(azimuth), np.radians(max(2.0 * elevation, 42.0))
+        side = np.cross(upward, front)
+        return np.cos(e) * (np.cos(a) * front + np.sin(a) * side) + np.sin(e) * np.sign(facing @ upward) * upward
+    level = _unit(facing - (facing @ upward) * upward)
+    side = np.cross(upward, level)
+    a = np.radians(azimuth)
+    turned = _unit(np.cos(a) * level + np.sin(a) * side)
+    e = np.radians(elevation) + 0.5 * np.arcsin(np.clip(facing @ upward, -1.0, 1.0))
+    return np.cos(e) * turned + np.sin(e) * upward  # type: ignore[no-any-return]
+
+
+def _fit(vertices: Vectors, right: Vectors, up: Vectors, forward: Vectors, tan_x: float, tan_y: float) -> Vectors:
+    """The nearest position from which all vertices lie within the angle of view.
+
+    Each side of the view is a plane through the camera; a vertex is inside when its signed distance is not positive. The
+    extreme vertex of each side gives that plane's place, and two opposite planes meet at the greatest depth possible.
+    """
+    depth = vertices @ forward
+    centre, nearest = [], []
+    for axis, tangent in ((right, tan_x), (up, tan_y)):
+        along = vertices @ axis
+        high, low = (along - tangent * depth).max(), (-along - tangent * depth).max()
+        centre.append(0.5 * (high - low))
+        nearest.append(-(high + low) / (2.0 * tangent))
+    extent = float(np.ptp(vertices, axis=0).max())
+    back = min(*nearest, float(depth.min()) - 0.05 * extent)
+    return centre[0] * right + centre[1] * up + back * forward  # type: ignore[no-any-return]

@@ -1,0 +1,150 @@
+"""How much key light and sky reaches each sample: a few rays from fixed patterns, then a filter that respects edges."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.compile import kernel
+from weathercoat.output.rays import RayQueries
+from weathercoat.output.shading import add_sky
+
+_SUN_RADIUS = 0.09  # radians: soft enough to read as a shadow of something near
+_STRATA = 16  # neighbouring samples share one set of directions: each 4 x 4 block covers the hemisphere evenly
+_LIFT = 3e-4  # start of a ray above its surface, in sizes
+
+
+def gather_light(
+    rays: RayQueries,
+    row: NDArray[np.int32],
+    column: NDArray[np.int32],
+    position: NDArray[np.float64],
+    facet: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    *,
+    key: NDArray[np.float64],
+    up: NDArray[np.float64],
+    sky_rays: int,
+    key_rays: int,
+    reach: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The visible share of the key light (s,) and the mean radiance of the sky over the cosine-weighted hemisphere (s, 3).
+
+    position, facet (the face's normal), normal (the shading normal): (s, 3), for samples at `row`, `column` of the picture.
+    Sky is blocked by what lies within `reach`.
+    """
+    count = len(position)
+    origins = (position + _LIFT * facet).astype(np.float32)
+    directions = np.empty((count, 3), np.float32)
+    lit, sky = np.zeros(count), np.zeros((count, 3))
+    for index in range(key_rays):
+        key_directions(row, column, key, index, key_rays, directions)
+        lit += ~rays.blocked(origins, directions, 1e4)
+    for index in range(sky_rays):
+        sky_directions(row, column, facet, normal, index, sky_rays, directions)
+        add_sky(directions, rays.blocked(origins, directions, reach), up, sky)
+    return lit / key_rays, sky / sky_rays
+
+
+@kernel
+def _hash(a, b, c):  # type: ignore[no-untyped-def]
+    """A fixed value in [0, 1) for three integers (murmur3's finaliser)."""
+    h = (np.uint32(a) * np.uint32(0x9E3779B1)) ^ (np.uint32(b) * np.uint32(0x85EBCA77)) ^ (np.uint32(c) * np.uint32(0xC2B2AE3D))
+    h = np.uint32(h ^ (h >> np.uint32(16)))
+    h = np.uint32(h * np.uint32(0x85EBCA6B))
+    h = np.uint32(h ^ (h >> np.uint32(13)))
+    h = np.uint32(h * np.uint32(0xC2B2AE35))
+    return np.float64(np.uint32(h ^ (h >> np.uint32(16)))) * 2.3283064365386963e-10
+
+
+@kernel
+def _stratified(row, column, index, total, out):  # type: ignore[no-untyped-def]
+    """A point of the unit square: point `index` of the sample's own set of an R2 sequence, jittered; to `out` (2,).
+
+    Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
+    """
+    place = (row % 4) * 4 + (column % 4)
+    number = ((place * 7) % _STRATA) * total + index
+    jitter = 0.7 / np.sqrt(_STRATA * total)
+    out[0] = (0.5 + number * 0.7548776662466927 + jitter * _hash(row, column, 2 * index)) % 1.0
+    out[1] = (0.5 + number * 0.5698402909980532 + jitter * _hash(row, column, 2 * index + 1)) % 1.0
+
+
+@kernel
+def _frame(n, t, b):  # type: ignore[no-untyped-def]
+    """Two unit vectors that complete n to a frame (Duff et al., Building an orthonormal basis, revisited, 2017)."""
+    sign = 1.0 if n[2] >= 0.0 else -1.0
+    p = -1.0 / (sign + n[2])
+    q = n[0] * n[1] * p
+    t[0], t[1], t[2] = 1.0 + sign * n[0] * n[0] * p, sign * q, -sign * n[0]
+    b[0], b[1], b[2] = q, sign + n[1] * n[1] * p, -n[1]
+
+
+@kernel
+def sky_directions(row, column, facet, normal, index, total, out):  # type: ignore[no-untyped-def]
+    """A cosine-distributed direction for each sample, (s, 3), never under its face."""
+    t, b, point = np.empty(3), np.empty(3), np.empty(2)
+    for i in range(len(row)):
+        _frame(normal[i], t, b)
+        _stratified(row[i], column[i], index, total, point)
+        radius, angle = np.sqrt(point[0]), 2.0 * np.pi * point[1]
+        x, y, z = radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1.0 - point[0])
+        under = 0.0
+        for c in range(3):
+            out[i, c] = x * t[c] + y * b[c] + z * normal[i, c]
+            under += out[i, c] * facet[i, c]
+        if under < 0.02:
+            for c in range(3):
+                out[i, c] += (0.02 - under) * facet[i, c]
+
+
+@kernel
+def key_directions(row, column, key, index, total, out):  # type: ignore[no-untyped-def]
+    """A direction within the key light's disc for each sample, (s, 3)."""
+    t, b, point = np.empty(3), np.empty(3), np.empty(2)
+    _frame(key, t, b)
+    for i in range(len(row)):
+        _stratified(row[i], column[i], index, total, point)
+        radius, angle = _SUN_RADIUS * np.sqrt(point[0]), 2.0 * np.pi * point[1]
+        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        length = np.sqrt(1.0 + radius * radius)
+        for c in range(3):
+            out[i, c] = (key[c] + x * t[c] + y * b[c]) / length
+
+
+@kernel
+def filter_light(sample, row, column, position, facet, tolerance, lit, sky, out_lit, out_sky):  # type: ignore[no-untyped-def]
+    """Average the light of each sample with its neighbours in the picture that lie on the same surface.
+
+    sample int32 (height, width): the number of the sample at each place, -1 where there is none. A neighbour counts when
+    the two facets turn by less than 45 degrees and it lies within `tolerance` of the sample's plane.
+    """
+    height, width = sample.shape
+    for i in range(len(row)):
+        weight, light, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0
+        for dy in range(-2, 3):
+            r = row[i] + dy
+            if r < 0 or r >= height:
+                continue
+            for dx in range(-2, 3):
+                c = column[i] + dx
+                if c < 0 or c >= width:
+                    continue
+                j = sample[r, c]
+                if j < 0:
+                    continue
+                cosine, away = 0.0, 0.0
+                for axis in range(3):
+                    cosine += facet[i, axis] * facet[j, axis]
+                    away += facet[i, axis] * (position[j, axis] - position[i, axis])
+                if cosine < 0.7 or abs(away) > tolerance:
+                    continue
+                # The outer ring counts half, which makes the window four samples wide: one full set of directions.
+                w = (0.5 if abs(dx) == 2 else 1.0) * (0.5 if abs(dy) == 2 else 1.0)
+                weight += w
+                light += w * lit[j]
+                x += w * sky[j, 0]
+                y += w * sky[j, 1]
+                z += w * sky[j, 2]
+        out_lit[i] = light / weight
+        out_sky[i, 0], out_sky[i, 1], out_sky[i, 2] = x / weight, y / weight, z / weight

@@ -1,0 +1,282 @@
+"""Colour of a point of the picture: procedural paint, primer, steel and rust, lit by a sun, a sky and the ground.
+
+Everything is in linear light and in units of the object's size (the square root of its area), so the pattern belongs to
+the paint and neither to the mesh nor to the picture. Positions are those at rest: the pattern moves with the film.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.compile import kernel
+
+FRONT, BACK, RIM, METAL, BARE_PART = 0, 1, 2, 3, 4
+
+
+def to_linear(srgb: object) -> NDArray[np.float64]:
+    """Linear light of sRGB values from 0 to 1 (IEC 61966-2-1)."""
+    value = np.asarray(srgb, np.float64)
+    return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """sRGB bytes of linear light from 0 to 1 (IEC 61966-2-1)."""
+    value = np.clip(linear, 0.0, 1.0)
+    value = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1.0 / 2.4) - 0.055)
+    return np.rint(value * 255.0).astype(np.uint8)
+
+
+@kernel
+def _lattice(i, j, k):  # type: ignore[no-untyped-def]
+    """A fixed value in [0, 1) at an integer lattice point (murmur3's finaliser)."""
+    h = (np.uint32(i) * np.uint32(0x8DA6B343)) ^ (np.uint32(j) * np.uint32(0xD8163841)) ^ (np.uint32(k) * np.uint32(0xCB1AB31F))
+    h = np.uint32(h ^ (h >> np.uint32(16)))
+    h = np.uint32(h * np.uint32(0x85EBCA6B))
+    h = np.uint32(h ^ (h >> np.uint32(13)))
+    h = np.uint32(h * np.uint32(0xC2B2AE35))
+    h = np.uint32(h ^ (h >> np.uint32(16)))
+    return np.float64(h) * 2.3283064365386963e-10
+
+
+@kernel
+def value_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
+    """Smooth noise in [0, 1] with one value per unit cell, interpolated by quintics; its gradient goes to `slope` (3,)."""
+    fx, fy, fz = np.floor(x), np.floor(y), np.floor(z)
+    i, j, k = np.int64(fx), np.int64(fy), np.int64(fz)
+    u, v, w = x - fx, y - fy, z - fz
+    su = u * u * u * (u * (u * 6.0 - 15.0) + 10.0)
+    sv = v * v * v * (v * (v * 6.0 - 15.0) + 10.0)
+    sw = w * w * w * (w * (w * 6.0 - 15.0) + 10.0)
+    du = 30.0 * u * u * (u * (u - 2.0) + 1.0)
+    dv = 30.0 * v * v * (v * (v - 2.0) + 1.0)
+    dw = 30.0 * w * w * (w * (w - 2.0) + 1.0)
+    a, b = _lattice(i, j, k), _lattice(i + 1, j, k)
+    c, d = _lattice(i, j + 1, k), _lattice(i + 1, j + 1, k)
+    e, f = _lattice(i, j, k + 1), _lattice(i + 1, j, k + 1)
+    g, h = _lattice(i, j + 1, k + 1), _lattice(i + 1, j + 1, k + 1)
+    k0, k1, k2, k3 = a, b - a, c - a, e - a
+    k4, k5, k6 = a - b - c + d, a - c - e + g, a - b - e + f
+    k7 = -a + b + c - d + e - f - g + h
+    slope[0] = du * (k1 + k4 * sv + k6 * sw + k7 * sv * sw)
+    slope[1] = dv * (k2 + k4 * su + k5 * sw + k7 * su * sw)
+    slope[2] = dw * (k3 + k5 * sv + k6 * su + k7 * su * sv)
+    return k0 + k1 * su + k2 * sv + k3 * sw + k4 * su * sv + k5 * sv * sw + k6 * su * sw + k7 * su * sv * sw
+
+
+@kernel
+def fractal_noise(x, y, z, frequency, octaves, slope, scratch):  # type: ignore[no-untyped-def]
+    """Sum of octaves of noise, each half as high and 2.03 times as fine, in [0, 1]; gradient to `slope` (3,)."""
+    total, weight, height, f = 0.0, 0.0, 1.0, frequency
+    slope[0] = slope[1] = slope[2] = 0.0
+    for octave in range(octaves):
+        shift = 17.31 * octave
+        total += height * value_noise(x * f + shift, y * f + 1.7 * shift, z * f + 2.3 * shift, scratch)
+        for axis in range(3):
+            slope[axis] += height * f * scratch[axis]
+        weight += height
+        height *= 0.5
+        f *= 2.03
+    for axis in range(3):
+        slope[axis] /= weight
+    return total / weight
+
+
+@kernel
+def _smooth_step(low, high, x):  # type: ignore[no-untyped-def]
+    t = min(1.0, max(0.0, (x - low) / (high - low)))
+    return t * t * (3.0 - 2.0 * t)
+
+
+@kernel
+def _blend(color, other, share):  # type: ignore[no-untyped-def]
+    for c in range(3):
+        color[c] += share * (other[c] - color[c])
+
+
+@kernel
+def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ignore[no-untyped-def]
+    """Lay rust of a given `amount` (0 to 1) over `albedo`, roughen `bump`; returns the share of the surface it covers.
+
+    Rust spreads where the amount exceeds a noise, so it grows as patches with an irregular edge: bright where it is young
+    (just above the threshold), dark brown in the core, with darker pits. `colors` (3, 3): rim, body and core.
+    """
+    if amount <= 0.004:
+        return 0.0
+    x, y, z = rest[0], rest[1], rest[2]
+    patch = fractal_noise(x, y, z, 9.0, 5, slope, scratch)
+    level = 1.55 * amount - 1.7 * (patch - 0.2)
+    cover = _smooth_step(-0.06, 0.14, level)
+    if cover <= 0.0:
+        return 0.0
+    grain = fractal_noise(x, y, z, 70.0, 3, slope, scratch)
+    mottle = 0.6 * patch + 0.4 * grain
+    age = min(1.0, max(0.0, level * 1.15 + 1.3 * (0.5 - mottle)))
+    body = _smooth_step(0.1, 0.5, age)
+    core = _smooth_step(0.55, 1.15, age)
+    pit = _smooth_step(0.6, 0.74, grain) * _smooth_step(0.15, 0.6, level)
+    shade = 0.72 + 0.56 * grain
+    for c in range(3):
+        rust = colors[0, c] + body * (colors[1, c] - colors[0, c])
+        rust += core * (colors[2, c] - rust)
+        rust *= shade * (1.0 - 0.65 * pit)
+        albedo[c] += cover * (rust - albedo[c])
+    for axis in range(3):
+        bump[axis] += cover * 0.0075 * slope[axis]
+    return cover
+
+
+@kernel
+def _film_color(rest, up, stain, dust, palette, albedo, bump, slope, scratch):  # type: ignore[no-untyped-def]
+    """Paint with runoff rust and dust over it, to `albedo`; returns its roughness and its gloss (0 to 1)."""
+    x, y, z = rest[0], rest[1], rest[2]
+    cloud = fractal_noise(x, y, z, 5.0, 3, slope, scratch)
+    for c in range(3):
+        albedo[c] *= 0.9 + 0.2 * cloud
+    value_noise(x * 95.0, y * 95.0, z * 95.0, slope)
+    for axis in range(3):
+        bump[axis] += 0.028 * slope[axis]
+    roughness, gloss = 0.34 + 0.18 * cloud, 1.0
+    if stain > 0.01:
+        # Streaks: fine across the fall line, long along it.
+        fall = x * up[0] + y * up[1] + z * up[2]
+        sx, sy, sz = x - fall * up[0], y - fall * up[1], z - fall * up[2]
+        streak = fractal_noise(
+            42.0 * sx + 4.0 * fall * up[0], 42.0 * sy + 4.0 * fall * up[1], 42.0 * sz + 4.0 * fall * up[2], 1.0, 3, slope, scratch
+        )
+        cover = _smooth_step(0.0, 1.0, stain * (0.55 + 1.3 * (streak - 0.2)))
+        for c in range(3):
+            # A thin stain filters the paint's light, a thick one covers it.
+            albedo[c] *= np.exp(-cover * palette[6, c])
+        _blend(albedo, palette[5], 0.75 * cover * cover)
+        roughness += 0.35 * cover
+        gloss *= 1.0 - 0.7 * cover
+    if dust > 0.01:
+        speck = fractal_noise(x, y, z, 28.0, 3, slope, scratch)
+        veil = (1.0 - np.exp(-1.4 * dust)) * min(1.0, 0.45 + 0.9 * speck)
+        _blend(albedo, palette[7], 0.85 * veil)
+        roughness += 0.4 * veil
+        gloss *= 1.0 - 0.9 * veil
+    return min(roughness, 0.95), gloss
+
+
+@kernel
+def _ggx(normal_light, normal_view, normal_half, view_half, roughness, f0):  # type: ignore[no-untyped-def]
+    """Specular lobe times cosine: GGX, Smith's shadowing in its joint approximation, Schlick's Fresnel.
+
+    Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007.
+    """
+    a = roughness * roughness
+    a2 = a * a
+    d = normal_half * normal_half * (a2 - 1.0) + 1.0
+    distribution = a2 / (np.pi * d * d)
+    k = 0.5 * a
+    visible = 0.25 / ((normal_light * (1.0 - k) + k) * (normal_view * (1.0 - k) + k))
+    fresnel = f0 + (1.0 - f0) * (1.0 - view_half) ** 5
+    return distribution * visible * fresnel * normal_light
+
+
+@kernel
+def _sky(x_up, out):  # type: ignore[no-untyped-def]
+    """Radiance from a direction whose component along up is `x_up`: a pale sky over a warmer, darker ground."""
+    t = _smooth_step(-0.25, 0.35, x_up)
+    high = max(0.0, x_up)
+    out[0] = (1.0 - t) * 0.30 + t * (0.92 - 0.20 * high)
+    out[1] = (1.0 - t) * 0.28 + t * (0.95 - 0.12 * high)
+    out[2] = (1.0 - t) * 0.26 + t * 1.00
+
+
+@kernel
+def add_sky(directions, blocked, up, total):  # type: ignore[no-untyped-def]
+    """Add to `total` (s, 3) the sky's light along one direction a sample; where it is blocked, a dim reflected light."""
+    sky = np.empty(3)
+    for i in range(len(directions)):
+        _sky(directions[i, 0] * up[0] + directions[i, 1] * up[1] + directions[i, 2] * up[2], sky)
+        for c in range(3):
+            total[i, c] += 0.07 * sky[c] if blocked[i] else sky[c]
+
+
+@kernel
+def shade(kind, position, normal, rest, stain, dust, rust, layer, color, eye, key, key_color, up, palette, lit, sky_light, out):  # type: ignore[no-untyped-def]
+    """Tone-mapped linear colour of s samples, to `out` float32 (s, 3).
+
+    kind (s,): FRONT, BACK, RIM, METAL or BARE_PART; position, normal, rest (s, 3); stain, dust, rust, layer (s,), the
+    last the place between the back (0) and the front (1) of the rim; color (s, 3) linear paint; key (3,) towards the key
+    light; lit (s,) its visible share; sky_light (s, 3) mean radiance over the cosine-weighted hemisphere. palette (9, 3):
+    primer, steel, the three of rust, stain, its absorption, dust, parts without paint.
+    """
+    albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    n, view, env = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(kind)):
+        k = kind[i]
+        bump[:] = 0.0
+        f0, roughness, gloss, metallic = 0.04, 0.6, 1.0, 0.0
+        if k == FRONT or (k == RIM and layer[i] > 0.6):
+            albedo[:] = color[i]
+            roughness, gloss = _film_color(rest[i], up, stain[i], dust[i], palette, albedo, bump, slope, scratch)
+        elif k == BACK or k == RIM:
+            albedo[:] = palette[0]
+            value = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 30.0, 3, slope, scratch)
+            for c in range(3):
+                albedo[c] *= 0.82 + 0.3 * value
+            roughness, gloss = 0.8, 0.5
+            if k == BACK:
+                cover = _rust_layer(rest[i], 0.55 * rust[i], palette[2:5], albedo, bump, slope, scratch)
+                gloss *= 1.0 - cover
+        elif k == METAL:
+            albedo[:] = palette[1]
+            scale = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 14.0, 4, slope, scratch)
+            for c in range(3):
+                albedo[c] *= 0.75 + 0.5 * scale
+            cover = _rust_layer(rest[i], rust[i], palette[2:5], albedo, bump, slope, scratch)
+            metallic = 0.75 * (1.0 - cover)
+            roughness = 0.42 + 0.2 * scale + 0.45 * cover
+            gloss = 1.0 - 0.6 * cover
+            veil = 0.5 * (1.0 - np.exp(-1.4 * dust[i]))
+            _blend(albedo, palette[7], veil)
+            metallic *= 1.0 - veil
+        else:
+            albedo[:] = palette[8]
+            roughness = 0.5
+        distance = 0.0
+        for c in range(3):
+            view[c] = eye[c] - position[i, c]
+            distance += view[c] * view[c]
+        along = 0.0
+        for c in range(3):
+            view[c] /= np.sqrt(distance)
+            along += bump[c] * normal[i, c]
+        length = 0.0
+        for c in range(3):
+            n[c] = normal[i, c] - (bump[c] - along * normal[i, c])
+            length += n[c] * n[c]
+        nl, nv, vl, up_reflected = 0.0, 0.0, 0.0, 0.0
+        for c in range(3):
+            n[c] /= np.sqrt(length)
+            nl += n[c] * key[c]
+            nv += n[c] * view[c]
+            vl += view[c] * key[c]
+        nv = max(nv, 0.04)
+        for c in range(3):
+            up_reflected += up[c] * (2.0 * nv * n[c] - view[c])
+        _sky(up_reflected, env)
+        openness = (sky_light[i, 0] + sky_light[i, 1] + sky_light[i, 2]) / 2.6
+        specular = 0.0
+        if nl > 0.0 and lit[i] > 0.0:
+            half = np.sqrt(max(1e-9, 2.0 + 2.0 * vl))
+            specular = _ggx(nl, nv, min(1.0, (nl + nv) / half), (1.0 + vl) / half, max(roughness, 0.2), 1.0)
+        edge = (1.0 - nv) ** 5
+        for c in range(3):
+            tint = f0 * gloss * (1.0 - metallic) + metallic * albedo[c]
+            fresnel = tint + (max(tint, 1.0 - roughness) - tint) * edge * gloss
+            light = albedo[c] * (1.0 - metallic) * (max(nl, 0.0) * lit[i] * key_color[c] / np.pi + sky_light[i, c])
+            light += tint * specular * lit[i] * key_color[c] + 0.8 * fresnel * env[c] * min(1.0, openness)
+            out[i, c] = tone(light)
+
+
+@kernel
+def tone(x):  # type: ignore[no-untyped-def]
+    """A film-like shoulder: linear up to 0.55, then bent so that white is reached only by far brighter light."""
+    if x <= 0.55:
+        return x
+    return 0.55 + 0.45 * (1.0 - np.exp(-(x - 0.55) / 0.45))
