@@ -1,0 +1,268 @@
+"""Figures of snapshots and meshes, and the two JSON files of a run: the report and its timing.
+
+Areas and lengths are those of the mesh at the start (at rest), in units of the model; shares are of the
+film's area at the start. Everything that depends on the machine's speed is in the timing, so that the report
+of the same input and seed has the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from weathercoat import __version__
+from weathercoat.errors import AccessError, CheckError, Note
+from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
+from weathercoat.sim.snapshot import Snapshot
+
+REPORT_VERSION = 1
+LIBRARIES = ("numpy", "scipy", "numba")
+LARGEST_FLAKES = 20
+SIGNIFICANT_DIGITS = 12
+
+# The rows of the paper's table of times, by the name of the stage that fills them.
+PAPER_ROWS = {
+    "failure": "failure tests and constraint set-up",
+    "deformation": "deformation",
+    "mesh": "mesh generation",
+    "stains": "stains and colours",
+    "other": "other",
+}
+
+
+def measure_snapshot(
+    snapshot: Snapshot, *, flake_areas: ArrayLike = (), strain: float = 0.0, residual: float = 0.0
+) -> dict[str, Any]:
+    """The figures of one snapshot.
+
+    flake_areas: rest area of every flake that has fallen so far; strain and residual: those of the
+    deformation, as the solver gives them. The result:
+
+    - separated_share: area of the film that has let go and not fallen, a face counting by its separated
+    corners; - lost_area, lost_share: area of the film that has fallen; affected_share: the sum of both
+    shares; - crack_length: length of the edges along which two faces of the film have come apart; a single
+    broken edge whose ends still hold together is not open and does not count. outline_length: length of the
+    edges between film and lost film; - flakes: count, total, median and largest area, and the areas of the
+    largest (at most 20); - film_rust, substrate_rust, dust: means by area, over the film that is left and
+    over the whole metal; - strain, residual.
+    """
+    areas = face_areas(snapshot.substrate_vertices, snapshot.substrate_faces)
+    total = float(areas.sum())
+    film_areas = areas[snapshot.film_face]
+    has_fallen = np.ones(len(areas), np.bool_)
+    has_fallen[snapshot.film_face] = False
+    lost = float(areas[has_fallen].sum())
+    separated = float((film_areas * snapshot.separated[snapshot.film_faces].mean(axis=1)).sum())
+    crack_length, outline_length = measure_openings(snapshot)
+    flakes = np.sort(np.asarray(flake_areas, np.float64).ravel())[::-1]
+    return {
+        "step": int(snapshot.step),
+        "age": float(snapshot.age),
+        "film_faces": len(snapshot.film_faces),
+        "film_vertices": len(snapshot.film_vertices),
+        "separated_share": separated / total,
+        "lost_area": lost,
+        "lost_share": lost / total,
+        "affected_share": (separated + lost) / total,
+        "crack_length": crack_length,
+        "outline_length": outline_length,
+        "flakes": {
+            "count": len(flakes),
+            "area": float(flakes.sum()),
+            "median_area": float(np.median(flakes)) if len(flakes) else 0.0,
+            "largest_area": float(flakes[0]) if len(flakes) else 0.0,
+            "largest_areas": flakes[:LARGEST_FLAKES].tolist(),
+        },
+        "film_rust": _mean(snapshot.film_rust, snapshot.film_faces, film_areas),
+        "substrate_rust": _mean(snapshot.substrate_rust, snapshot.substrate_faces, areas),
+        "dust": _mean(snapshot.dust, snapshot.substrate_faces, areas),
+        "strain": float(strain),
+        "residual": float(residual),
+    }
+
+
+def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
+    """Rest length of the edges between two faces of the film that came apart, and between film and lost
+    film."""
+    count = len(snapshot.substrate_vertices)
+    faces = snapshot.film_faces
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    origin = snapshot.film_origin.astype(np.int64)
+    forward = origin[tail] * count + origin[head]
+    backward = origin[head] * count + origin[tail]
+    order = np.argsort(forward, kind="stable")
+    place = np.minimum(np.searchsorted(forward[order], backward), max(len(order) - 1, 0))
+    twin = order[place] if len(order) else order
+    has_twin = forward[twin] == backward
+    apart = has_twin & ((tail != head[twin]) | (head != tail[twin]))
+
+    metal = snapshot.substrate_faces.astype(np.int64)
+    metal_edges = (metal * count + np.roll(metal, -1, axis=1)).ravel()
+    at_loss = ~has_twin & np.isin(backward, metal_edges)
+
+    ends = snapshot.substrate_vertices[origin[tail]], snapshot.substrate_vertices[origin[head]]
+    length = np.linalg.norm(ends[1] - ends[0], axis=1)
+    return 0.5 * float(length[apart].sum()), float(length[at_loss].sum())
+
+
+def measure_surface(surface: Surface) -> dict[str, Any]:
+    """Counts, area, diagonal and the statistics of edges and angles of a mesh."""
+    faces = surface.faces.astype(np.int64)
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, uses = np.unique(edges, axis=0, return_counts=True)
+    length = np.linalg.norm(surface.vertices[edges[:, 1]] - surface.vertices[edges[:, 0]], axis=1)
+    smallest = _smallest_angles(surface.vertices, surface.faces)
+    return {
+        "faces": len(faces),
+        "vertices": len(np.unique(faces)),
+        "area": surface.area(),
+        "diagonal": surface.diagonal(),
+        "edges": {
+            "count": len(edges),
+            "mean_length": float(length.mean()),
+            "length_variation": float(length.std() / length.mean()) if length.any() else 0.0,
+            "boundary_length": float(length[uses == 1].sum()),
+        },
+        "smallest_angle": {"median": float(np.median(smallest)), "worst": float(smallest.min())},
+        "groups": [name for i, name in enumerate(surface.groups) if np.any(surface.face_group == i)],
+    }
+
+
+def make_report(
+    *,
+    config: Mapping[str, Any],
+    seed: int,
+    inputs: Mapping[str, str],
+    meshes: Mapping[str, Mapping[str, Any]],
+    notes: Iterable[Note],
+    stopped: str,
+    snapshots: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """The content of `run.json`.
+
+    config: the resolved values; inputs: SHA-256 by file name, without folders, which differ from machine to
+    machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; stopped: why the run
+    ended; snapshots: the figures of each. Figures are rounded to 12 digits, the config is not.
+    """
+    return {
+        "report_version": REPORT_VERSION,
+        "config": dict(config),
+        "seed": seed,
+        "versions": versions(),
+        "inputs": {name: {"sha256": digest} for name, digest in inputs.items()},
+        "meshes": _rounded(meshes),
+        "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],
+        "stopped": stopped,
+        "snapshots": _rounded(snapshots),
+    }
+
+
+def make_timing(simulation: Mapping[str, float], around: Mapping[str, float]) -> dict[str, Any]:
+    """The content of `timing.json`.
+
+    simulation: seconds of the steps by the keys of `PAPER_ROWS`; around: seconds of what comes before and
+    after them, by any name. The paper's table gives shares of the steps alone, and so does this one. KeyError
+    for an unknown row.
+    """
+    unknown = sorted(set(simulation) - set(PAPER_ROWS))
+    if unknown:
+        raise KeyError(f"no row of the table: {', '.join(unknown)}")
+    total = float(sum(simulation.values()))
+    rows = []
+    for key, title in PAPER_ROWS.items():
+        seconds = float(simulation.get(key, 0.0))
+        rows.append(
+            {"row": title, "seconds": seconds, "percent": 100.0 * seconds / total if total > 0 else 0.0}
+        )
+    return {
+        "simulation": {"seconds": total, "rows": rows},
+        "around": {name: float(seconds) for name, seconds in around.items()},
+        "seconds": total + float(sum(around.values())),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, of the libraries that figures depend on, and of weathercoat."""
+    found = {name: metadata.version(name) for name in LIBRARIES}
+    return {"python": platform.python_version(), "weathercoat": __version__, **found}
+
+
+def sha256(content: bytes | Path) -> str:
+    """SHA-256 of bytes or of a file, in hexadecimal. Raises AccessError where the file cannot be read."""
+    if isinstance(content, bytes):
+        return hashlib.sha256(content).hexdigest()
+    try:
+        with content.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise AccessError(error.strerror or "cannot be read", file=str(content)) from error
+
+
+def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
+    """Write JSON with sorted keys, floats in the fewest digits that read back as the same double.
+
+    Raises CheckError for a value that is not finite or that JSON has no form for, naming its key, before
+    anything is written; OSError where the file cannot be written.
+    """
+    plain = _plain(content, "", Path(path).name)
+    text = json.dumps(plain, sort_keys=True, indent=2, ensure_ascii=False)
+    Path(path).write_bytes((text + "\n").encode("utf-8", "backslashreplace"))
+
+
+def _plain(value: Any, key: str, file: str) -> Any:
+    """The value in Python's own types; CheckError where that cannot be."""
+    if isinstance(value, Mapping):
+        return {
+            str(name): _plain(item, f"{key}.{name}" if key else str(name), file)
+            for name, item in value.items()
+        }
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(item, f"{key}[{i}]", file) for i, item in enumerate(value)]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        if not np.isfinite(value):
+            raise CheckError(f"{key} is {value}", file=file)
+        return float(value)
+    if value is None or isinstance(value, str):
+        return value
+    raise CheckError(f"{key} is a {type(value).__name__}, which JSON has no form for", file=file)
+
+
+def _rounded(value: Any) -> Any:
+    """Figures to 12 significant digits: those beyond are the round-off of sums, whose order differs from CPU
+    to CPU."""
+    if isinstance(value, Mapping):
+        return {name: _rounded(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(item) for item in value]
+    if isinstance(value, float):
+        return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
+    return value
+
+
+def _mean(values: Vectors, faces: Indices, areas: Vectors) -> float:
+    """Mean of a linear function on triangles, given at their corners; 0 where there are none."""
+    total = float(areas.sum())
+    return float((values[faces].mean(axis=1) * areas).sum()) / total if total > 0 else 0.0
+
+
+def _smallest_angles(vertices: Vectors, faces: Indices) -> NDArray[np.float64]:
+    """Smallest angle of each face, in degrees, (m,); 0 where a face has no area."""
+    corner = vertices[faces]
+    angles = np.empty(faces.shape)
+    for i in range(3):
+        a = corner[:, (i + 1) % 3] - corner[:, i]
+        b = corner[:, (i + 2) % 3] - corner[:, i]
+        angles[:, i] = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    return np.degrees(angles.min(axis=1))
