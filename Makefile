@@ -1,0 +1,58 @@
+# Each target makes the virtual environment that it needs from pyproject.toml and nothing else.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+BIN := .venv/bin
+DEMO := demo
+
+# The environment is made anew when the dependencies or the interpreter change, whatever the times of files say.
+FINGERPRINT := $(shell { cat pyproject.toml; $(PYTHON) --version; } 2>&1 | cksum | tr ' ' '-')
+
+# Tests on real meshes run where a checkout has them beside it.
+ifneq ($(wildcard ../shared/meshes/index.tsv),)
+export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
+endif
+
+.PHONY: help demo test test-all lint docs venv dev clean
+
+help:
+	@echo "make demo      age a sign plate and say where to look"
+	@echo "make test      run the tests (make test-all: the long ones too)"
+	@echo "make lint      style, types and import contracts"
+	@echo "make docs      run the commands of the documentation again and refresh its pictures"
+	@echo "make clean     remove the environment, the demo and the caches"
+
+venv: .venv/run-$(FINGERPRINT)
+dev: .venv/dev-$(FINGERPRINT)
+
+.venv/run-$(FINGERPRINT):
+	$(PYTHON) -m venv --clear .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+.venv/dev-$(FINGERPRINT): | .venv/run-$(FINGERPRINT)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+demo: venv
+	@mkdir -p $(DEMO)
+	$(BIN)/weathercoat sample sign -o $(DEMO)/sign.obj --overwrite
+	$(BIN)/weathercoat run configs/standard.yaml $(DEMO)/sign.obj -o $(DEMO)/sign --overwrite
+	@echo "Look at $(DEMO)/sign/preview.png, or open a .glb of $(DEMO)/sign/snapshots in any glTF viewer."
+
+test: dev
+	$(BIN)/python -m pytest --numprocesses auto
+
+test-all: dev
+	$(BIN)/python -m pytest --numprocesses auto -m "long or not long"
+
+lint: dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+docs: venv
+	$(BIN)/python docs/make.py
+
+clean:
+	rm -rf .venv $(DEMO) build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
