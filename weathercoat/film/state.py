@@ -1,0 +1,201 @@
+"""The film's parameters and state: scalars on vertices, faces and half-edges that decide how it fails.
+
+What ages by a closed form is stored as (value at the last event, age of that event) and evaluated when it is needed, so
+that the number of steps is a resolution and not a part of the paint.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.compile import kernel
+from weathercoat.film.noise import fractal_noise, hash_bits, hash_uniform, stream_key
+from weathercoat.mesh.dihedral import all_bends
+from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh
+from weathercoat.mesh.surface import Vectors
+
+
+@dataclass(frozen=True)
+class FilmParameters:
+    """How the film ages and fails. Lengths in sizes, rates per unit of age, forces dimensionless.
+
+    The names are those of the config's sections: `adhesion_base` is `adhesion.base`. The string fields choose between
+    the paper's literal rules and the default ones; the default is the first.
+    """
+
+    tension_law: str = "saturating"  # or "linear"
+    tension_initial: float = 0.0
+    tension_rate: float = 3.0
+    adhesion_base: float = 1.0
+    adhesion_amplitude: float = 0.5
+    adhesion_wavelength: float = 0.25
+    adhesion_octaves: int = 3
+    adhesion_gain: float = 0.5
+    adhesion_decay_rate: float = 1.0
+    cohesion_base: float = 1.5
+    cohesion_scatter: float = 0.2
+    cohesion_decay_rate: float = 0.3
+    defects_rule: str = "per_area"  # or "share"
+    defects_density: float = 100.0
+    defects_share: float = 0.01
+    defects_strength: float = 0.001
+    lift_coefficient: float = 0.3
+    lift_convexity: float = 2.0
+    lift_sum: str = "per_valence"  # or "plain"
+    lift_tension: str = "drying"  # or "face"
+    fracture_direction_threshold: float = 0.45
+    fracture_direction_factor: float = 0.20
+    fracture_relaxation: str = "shear_lag"  # or "faces"
+    fracture_shear_lag: float = 0.04
+    fracture_face_factor: float = 0.5
+    fracture_rounds: str = "by_speed"  # or "one"
+    fracture_speed: float = 20.0
+    flaking_rule: str = "islands"  # or "faces"
+    flaking_hanging_share: float = 0.05
+
+
+class FilmRules(NamedTuple):
+    """The parameters that kernels need while edges break, as numbers."""
+
+    saturating: bool
+    tension_rate: float
+    cohesion_decay_rate: float
+    direction_threshold: float
+    direction_factor: float
+    shear_lag: float  # 0 where a break relaxes its two faces only
+    face_factor: float
+
+
+class FilmState(NamedTuple):
+    """State of the film, plain arrays. n0 rest vertices, m faces; arrays over vertices have the capacity 3 m.
+
+    Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite while attached;
+    crack_direction (3 m, 3), a unit vector on the rest surface where the vertex is the tip of one crack, else zero.
+    Faces: tension, tension_age, tension_cap (m,): the value at its last event, the age of it, and what it tends to;
+    tension_now (m,), evaluated at the age of the step; fray_age (m,), when the face got its first broken edge, infinite
+    before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie
+    uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a
+    round of fracture carried over between steps. mean_edge: mean rest length of the edges.
+    """
+
+    adhesion: Vectors
+    separated: NDArray[np.bool_]
+    separation_age: Vectors
+    crack_direction: Vectors
+    tension: Vectors
+    tension_age: Vectors
+    tension_cap: Vectors
+    tension_now: Vectors
+    fray_age: Vectors
+    cohesion: Vectors
+    lift_factor: Vectors
+    tie: NDArray[np.uint64]
+    crack_budget: Vectors
+    mean_edge: float
+
+
+def make_film_rules(parameters: FilmParameters) -> FilmRules:
+    """The numbers that kernels need."""
+    p = parameters
+    return FilmRules(
+        saturating=p.tension_law == "saturating",
+        tension_rate=p.tension_rate,
+        cohesion_decay_rate=p.cohesion_decay_rate,
+        direction_threshold=p.fracture_direction_threshold,
+        direction_factor=p.fracture_direction_factor,
+        shear_lag=p.fracture_shear_lag if p.fracture_relaxation == "shear_lag" else 0.0,
+        face_factor=p.fracture_face_factor,
+    )
+
+
+def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -> FilmState:
+    """The film at age 0: all attached, adhesion by noise, cohesion equal but for a scatter and a few defects."""
+    p = parameters
+    face_count = len(mesh.faces)
+    capacity = 3 * face_count
+    midpoint, edge_length, edge_area = _edge_geometry(mesh)
+    noise = fractal_noise(
+        mesh.rest_positions,
+        wavelength=p.adhesion_wavelength,
+        octaves=p.adhesion_octaves,
+        gain=p.adhesion_gain,
+        key=stream_key(seed, "adhesion"),
+    )
+    scatter = hash_uniform(midpoint, stream_key(seed, "cohesion"))
+    cohesion = p.cohesion_base * (1.0 + p.cohesion_scatter * (2.0 * scatter - 1.0))
+    share = p.defects_density * edge_area if p.defects_rule == "per_area" else p.defects_share
+    cohesion[hash_uniform(midpoint, stream_key(seed, "defects")) < share] *= p.defects_strength
+    bends = np.empty(capacity)
+    all_bends(mesh.positions, mesh.tail, mesh.twin, bends)
+    return FilmState(
+        adhesion=p.adhesion_base + p.adhesion_amplitude * noise,
+        separated=np.zeros(capacity, np.bool_),
+        separation_age=np.full(capacity, np.inf),
+        crack_direction=np.zeros((capacity, 3)),
+        tension=np.full(face_count, p.tension_initial),
+        tension_age=np.zeros(face_count),
+        tension_cap=np.ones(face_count),
+        tension_now=np.full(face_count, p.tension_initial),
+        fray_age=np.full(face_count, np.inf),
+        cohesion=cohesion,
+        lift_factor=1.0 / (1.0 + np.exp(-p.lift_convexity * bends)),
+        tie=hash_bits(midpoint, stream_key(seed, "ties")),
+        crack_budget=np.zeros(1),
+        mean_edge=float(edge_length.mean()),
+    )
+
+
+def _edge_geometry(mesh: HalfEdgeMesh) -> tuple[Vectors, Vectors, Vectors]:
+    """Rest midpoint (3 m, 3), length and area (a third of its faces') of the edge of each half-edge."""
+    corner = mesh.rest_positions[mesh.faces]
+    start = corner.reshape(-1, 3)
+    end = np.roll(corner, -1, axis=1).reshape(-1, 3)
+    area = np.repeat(0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1), 3)
+    paired = mesh.twin >= 0
+    edge_area = area / 3.0
+    edge_area[paired] += area[mesh.twin[paired]] / 3.0
+    return 0.5 * (start + end), np.linalg.norm(end - start, axis=1), edge_area
+
+
+@kernel
+def tension_at(value: float, since: float, cap: float, rate: float, saturating: bool, age: float) -> float:
+    """Tension at an age, from its value at the age `since`: towards `cap`, or linear without one."""
+    if saturating:
+        return cap + (value - cap) * math.exp(-rate * (age - since))
+    return value + rate * (age - since)
+
+
+@kernel
+def evaluate_tension(state: FilmState, rules: FilmRules, age: float) -> None:
+    """Bring `tension_now` of every face to an age."""
+    for f in range(len(state.tension)):
+        state.tension_now[f] = tension_at(
+            state.tension[f], state.tension_age[f], state.tension_cap[f], rules.tension_rate, rules.saturating, age
+        )
+
+
+def drying_tension(parameters: FilmParameters, age: float) -> float:
+    """Tension of a film that nothing has relaxed, at an age."""
+    p = parameters
+    return float(tension_at(p.tension_initial, 0.0, 1.0, p.tension_rate, p.tension_law == "saturating", age))
+
+
+def adhesion_at(adhesion: Vectors, parameters: FilmParameters, age: float) -> Vectors:
+    """Adhesion at an age: it falls linearly, by a rate of its base, and not below 0."""
+    return np.maximum(adhesion - parameters.adhesion_decay_rate * parameters.adhesion_base * age, 0.0)
+
+
+@kernel
+def inherit_film(state: FilmState, log: EventLog, first: int) -> None:
+    """Give the vertices of the log's splits from `first` on what their parents have; copies are no tips."""
+    for i in range(first, log.counts[0]):
+        new, parent = log.splits[i, 0], log.splits[i, 1]
+        state.separated[new] = state.separated[parent]
+        state.separation_age[new] = state.separation_age[parent]
+        state.crack_direction[new] = 0.0
+        state.crack_direction[parent] = 0.0

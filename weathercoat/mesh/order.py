@@ -1,0 +1,60 @@
+"""An order of vertices and faces that belongs to the shape, not to the file: along a space-filling curve.
+
+Neighbours on the surface come to lie near each other in memory, and renumbering the input changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.mesh.surface import Indices, Place, Surface, Vectors
+
+
+def morton_codes(points: Vectors) -> NDArray[np.uint64]:
+    """Position of each of the points (n, 3) along the Morton curve through their bounding cube, 21 bits an axis."""
+    low = points.min(axis=0)
+    extent = float((points.max(axis=0) - low).max()) or 1.0
+    cell = np.minimum(((points - low) / extent * 2**21).astype(np.uint64), np.uint64(2**21 - 1))
+    code = np.zeros(len(points), np.uint64)
+    for axis in range(3):
+        bits = cell[:, axis]
+        for shift, mask in (
+            (32, 0x1F00000000FFFF),
+            (16, 0x1F0000FF0000FF),
+            (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3),
+            (2, 0x1249249249249249),
+        ):
+            bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+        code |= bits << np.uint64(axis)
+    return code
+
+
+def order_surface(surface: Surface, points: Vectors) -> tuple[Surface, Indices]:
+    """The same surface with vertices and faces along the Morton curve of `points`, its vertices in any frame (n, 3).
+
+    Faces begin with their smallest vertex. Also returned: for each new face the old one, int32 (m,).
+    """
+    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], morton_codes(points)))
+    rank = np.empty(len(order), np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    faces = rank[surface.faces]
+    turn = faces.argmin(axis=1)
+    corner = (turn[:, None] + np.arange(3)) % 3
+    faces = np.take_along_axis(faces, corner, axis=1)
+    uv = None if surface.uv is None else np.take_along_axis(surface.uv, corner[:, :, None], axis=1)
+    face_order = np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))
+    place = surface.place
+    ordered = replace(
+        surface,
+        vertices=np.ascontiguousarray(surface.vertices[order]),
+        faces=np.ascontiguousarray(faces[face_order].astype(np.int32)),
+        face_group=surface.face_group[face_order],
+        uv=None if uv is None else uv[face_order],
+        colors=None if surface.colors is None else surface.colors[order],
+        place=None if place is None else Place(place.face[order], place.barycentric[order]),
+    )
+    return ordered, face_order.astype(np.int32)

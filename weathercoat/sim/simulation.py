@@ -1,0 +1,191 @@
+"""The simulation: one step of ageing in the paper's order."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from weathercoat.deform.sweeps import (
+    Constraints,
+    DeformParameters,
+    Residual,
+    deform,
+    follow_events,
+    make_constraints,
+    measure_residual,
+    release,
+)
+from weathercoat.film.flaking import flake
+from weathercoat.film.fracture import fracture
+from weathercoat.film.separation import find_separating, separate
+from weathercoat.film.state import (
+    FilmParameters,
+    FilmState,
+    adhesion_at,
+    evaluate_tension,
+    make_film_rules,
+    make_film_state,
+)
+from weathercoat.mesh.frame import Frame, make_frame
+from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, make_event_log, make_half_edges
+from weathercoat.mesh.order import order_surface
+from weathercoat.mesh.surface import Indices, Surface, Vectors
+from weathercoat.sim.snapshot import Snapshot
+from weathercoat.stain import rust as rust_room
+from weathercoat.stain.color import Palette, stain_color
+from weathercoat.stain.dust import dust_at, dust_exposure
+from weathercoat.stain.rust import RustState, StainParameters, make_rust_state, metal_rust_at
+
+_UP = np.array([0.0, 0.0, 1.0])  # in the simulation's frame
+
+
+@dataclass
+class Simulation:
+    """The state of a run. All lengths inside are in sizes, in the frame of the shape.
+
+    `surface` is the input in the order that the simulation uses; `flake_areas` lists the rest areas, in square sizes, of all
+    flakes that fell; `seconds` sums the time by stage, in the rows of the paper's table.
+    """
+
+    surface: Surface
+    frame: Frame
+    mesh: HalfEdgeMesh
+    film: FilmState
+    constraints: Constraints
+    rust: RustState
+    dust_exposure: Vectors
+    initial_twin: Indices
+    film_parameters: FilmParameters
+    deform_parameters: DeformParameters
+    stain_parameters: StainParameters
+    palette: Palette
+    steps: int
+    duration: float
+    step_count: int = 0
+    flake_areas: list[float] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0})
+    log: EventLog = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.log = make_event_log(len(self.mesh.faces))
+
+    @property
+    def age(self) -> float:
+        """The age reached."""
+        return self.age_after(self.step_count)
+
+    def age_after(self, steps: int) -> float:
+        """The age after a number of steps."""
+        return self.duration * steps / self.steps
+
+    def step(self) -> None:
+        """One tick of ageing: age, separate, fracture, flake, deform, stain."""
+        self.step_count += 1
+        age, tick = self.age, self.duration / self.steps
+        started = time.perf_counter()
+        self.log.clear()
+
+        evaluate_tension(self.film, make_film_rules(self.film_parameters), age)
+
+        separating = find_separating(self.mesh, self.film, self.film_parameters, age)
+        separate(self.film, separating, age)
+        release(self.mesh, self.constraints, separating, age)
+        rust_room.expose_lifted(self.mesh, self.rust, separating, age)
+
+        fracture(self.mesh, self.film, self.film_parameters, age, tick, self.log)
+
+        self.flake_areas.extend(flake(self.mesh, self.film, self.film_parameters, age, self.log).tolist())
+        follow_events(self.constraints, self.log)
+        decided = time.perf_counter()
+
+        deform(self.mesh, self.constraints, self.deform_parameters, age)
+        deformed = time.perf_counter()
+
+        rust_room.follow_events(self.mesh, self.rust, self.log, _UP, age)
+        rust_room.stain(self.mesh, self.rust, self.stain_parameters, _UP, tick)
+        self.seconds["failure"] += decided - started
+        self.seconds["deformation"] += deformed - decided
+        self.seconds["stains"] += time.perf_counter() - deformed
+
+    def residual(self) -> Residual:
+        """How far the film is from its length and angle constraints now."""
+        return measure_residual(self.mesh, self.constraints, self.deform_parameters, self.age)
+
+    def snapshot(self) -> Snapshot:
+        """Film and substrate now, in the model's units and axes."""
+        mesh, frame, age = self.mesh, self.frame, self.age
+        film_face = np.flatnonzero(mesh.alive).astype(np.int32)
+        corners = mesh.tail.reshape(-1, 3)[film_face]
+        used, faces = np.unique(corners, return_inverse=True)
+        origin = mesh.origin[used]
+        dust = dust_at(self.dust_exposure, self.stain_parameters.dust_rate, age)
+        metal_rust = metal_rust_at(self.rust, self.stain_parameters, age)
+        separated = self.film.separated[used]
+        return Snapshot(
+            step=self.step_count,
+            age=age,
+            film_vertices=self._film_positions(used),
+            film_faces=faces.reshape(-1, 3).astype(np.int32),
+            film_face=film_face,
+            film_origin=origin,
+            film_rust=self.rust.film[used],
+            separated=separated,
+            separation_age=np.where(separated, age - np.minimum(self.film.separation_age[used], age), 0.0),
+            adhesion=np.where(separated, 0.0, adhesion_at(self.film.adhesion, self.film_parameters, age)[origin]),
+            film_color=stain_color(self.palette.paint, self.palette, self.rust.film[used], dust[origin]),
+            substrate_vertices=self.surface.vertices,
+            substrate_normals=frame.turn(mesh.rest_normals),
+            substrate_faces=self.surface.faces,
+            substrate_rust=metal_rust,
+            dust=dust,
+            bare=self.rust.film_corners == 0,
+            substrate_color=stain_color(self.palette.metal, self.palette, metal_rust, dust),
+        )
+
+    def _film_positions(self, used: Indices) -> Vectors:
+        """Positions of film vertices in model units; the attached ones exactly where the input has them."""
+        positions = self.frame.globalise(self.mesh.positions[used])
+        attached = ~self.film.separated[used]
+        positions[attached] = self.surface.vertices[self.mesh.origin[used[attached]]]
+        return positions
+
+
+def make_simulation(
+    surface: Surface,
+    *,
+    film: FilmParameters | None = None,
+    deform: DeformParameters | None = None,
+    stain: StainParameters | None = None,
+    palette: Palette | None = None,
+    steps: int = 1000,
+    duration: float = 1.0,
+    seed: int = 1,
+    frame: Frame | None = None,
+) -> Simulation:
+    """A simulation of a manifold, oriented surface, at age 0; `duration` is the age that `steps` steps cover.
+
+    `frame` is that of the surface itself unless given; give the input's, where the surface is a remeshed one, so that noise lies
+    alike at every resolution.
+    """
+    frame = frame or make_frame(surface)
+    ordered, _ = order_surface(surface, frame.localise(surface.vertices))
+    mesh = make_half_edges(frame.localise(ordered.vertices), ordered.faces)
+    film = film or FilmParameters()
+    return Simulation(
+        surface=ordered,
+        frame=frame,
+        mesh=mesh,
+        film=make_film_state(mesh, film, seed),
+        constraints=make_constraints(mesh),
+        rust=make_rust_state(mesh),
+        dust_exposure=dust_exposure(mesh, _UP),
+        initial_twin=mesh.twin.copy(),
+        film_parameters=film,
+        deform_parameters=deform or DeformParameters(),
+        stain_parameters=stain or StainParameters(),
+        palette=palette or Palette(),
+        steps=steps,
+        duration=duration,
+    )
