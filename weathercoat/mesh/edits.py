@@ -48,6 +48,23 @@ def arc_on(v: int, chain: int, mesh: EditableMesh, features: Features) -> float:
 
 
 @kernel
+def longer_feature_beside(h: int, mesh: EditableMesh) -> int:
+    """The longest feature edge of the faces of the edge of h that is longer than that; h itself where there is none.
+
+    Flips cannot repair a flat triangle whose longest side is a feature, so that side has to be split first.
+    """
+    best, length = h, edge_length_of(h, mesh)
+    if mesh.crease[h] >= 0:
+        return h
+    for side in range(2):
+        k = h if side == 0 else mesh.twin[h]
+        for other in (next_of(k), prev_of(k)):
+            if mesh.crease[other] >= 0 and edge_length_of(other, mesh) > length:
+                best, length = other, edge_length_of(other, mesh)
+    return best
+
+
+@kernel
 def split_pass(
     candidates: Indices,
     ratios: Vectors,
@@ -60,9 +77,10 @@ def split_pass(
     done = 0
     for i in range(len(candidates)):
         h = candidates[i]
-        chain = mesh.crease[h]
-        if edge_length_of(h, mesh) <= (inner_limit if chain < 0 else feature_limit):
+        if edge_length_of(h, mesh) <= (inner_limit if mesh.crease[h] < 0 else feature_limit):
             continue
+        h = longer_feature_beside(h, mesh)
+        chain = mesh.crease[h]
         a, b = mesh.tail[h], mesh.tail[next_of(h)]
         t = ratios[i]
         if chain >= 0:

@@ -35,6 +35,26 @@ def fan_normals(mesh: EditableMesh) -> Vectors:
 
 
 @kernel
+def arcs_beside(v: int, mesh: EditableMesh, features: Features) -> tuple[float, float]:
+    """Arc lengths of the two neighbours of v, which is on a chain, along that chain; the smaller one first."""
+    chain = mesh.chain[v]
+    low, high = np.inf, -np.inf
+    first = mesh.half_edge[v]
+    h = first
+    while True:
+        if mesh.crease[h] == chain:
+            s = arc_on(mesh.tail[next_of(h)], chain, mesh, features)
+            low, high = min(low, s), max(high, s)
+        q = prev_of(h)
+        h = mesh.twin[q]
+        if h < 0 and mesh.crease[q] == chain:
+            s = arc_on(mesh.tail[q], chain, mesh, features)
+            low, high = min(low, s), max(high, s)
+        if h < 0 or h == first:
+            return low, high
+
+
+@kernel
 def smooth(
     mesh: EditableMesh,
     features: Features,
@@ -54,27 +74,14 @@ def smooth(
         chain = mesh.chain[v]
         if chain < FREE:
             continue
+        if chain >= 0:
+            before, after = arcs_beside(v, mesh, features)
+            arc[v] = 0.5 * (before + after)
+            continue
         first = mesh.half_edge[v]
         h = first
         move[:] = 0.0
         count = 0
-        if chain >= 0:
-            total = 0.0
-            while True:
-                if mesh.crease[h] == chain:
-                    total += arc_on(tail[next_of(h)], chain, mesh, features)
-                    count += 1
-                q = prev_of(h)
-                h = mesh.twin[q]
-                if h < 0:
-                    if mesh.crease[q] == chain:
-                        total += arc_on(tail[q], chain, mesh, features)
-                        count += 1
-                    break
-                if h == first:
-                    break
-            arc[v] = total / count
-            continue
         while True:
             u = tail[next_of(h)]
             dx, dy, dz = p[u, 0] - p[v, 0], p[u, 1] - p[v, 1], p[u, 2] - p[v, 2]
@@ -110,6 +117,10 @@ def apply_moves(
         if chain < FREE or not allowed[v]:
             continue
         if chain >= 0:
+            before, after = arcs_beside(v, mesh, features)
+            if not before < arc[v] < after:
+                stayed += 1
+                continue
             place_on_chain(chain, arc[v], features.offset, features.arc, features.point, target)
         else:
             for axis in range(3):
