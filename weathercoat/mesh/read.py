@@ -1,0 +1,165 @@
+"""Reading a model: from a file or a stream to a repaired `Surface`.
+
+The content decides the format, the extension only where the content does not tell. Nothing outside the model's folder
+is read, and nothing from the network.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from weathercoat.errors import (
+    AccessError,
+    EmptyFileError,
+    LimitError,
+    Note,
+    UsageError,
+    WeathercoatError,
+)
+from weathercoat.mesh.formats import sniff
+from weathercoat.mesh.formats.polygons import Polygons
+from weathercoat.mesh.repair import repair
+from weathercoat.mesh.surface import Surface
+
+MAX_BYTES = 2 << 30
+
+Up = str | tuple[float, float, float]
+
+_AXES = {
+    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
+}  # fmt: skip
+# glTF fixes its axis; the others follow the habit of the programs that write them.
+UP_OF_FORMAT = {"glb": "y", "gltf": "y", "obj": "y", "stl": "z", "ply": "z", "off": "z"}
+_UP_OF_OTHERS = "z"
+
+
+def read_surface(
+    path: str | Path, *, format: str | None = None, up: Up = "auto", max_faces: int = 20_000_000
+) -> Surface:
+    """Read a model, weld and repair it, ready for remeshing.
+
+    format: overrules content and extension ("obj", "ply", "stl", "off", "glb", "gltf", or an extension that meshio knows).
+    up: "auto" follows the format (glTF and OBJ +y, all others +z), else x, y, z, -x, -y, -z or a vector.
+    max_faces: triangles beyond which the model is refused.
+
+    Errors: AccessError, EmptyFileError, FormatError, CorruptError, MissingFileError, SecurityError, UnsupportedError;
+    NoFacesError, NoAreaError, NonFiniteError, PrecisionError, ScaleError; LimitError; each with the file's name.
+    """
+    path = Path(path)
+    direction = _direction(up)
+    try:
+        data = _load(path)
+        return _make_surface(data, path, path.name, format, direction, max_faces)
+    except WeathercoatError as error:
+        error.file = error.file or str(path)
+        raise
+
+
+def read_stream(
+    stream: BinaryIO, *, format: str | None = None, up: Up = "auto", max_faces: int = 20_000_000
+) -> Surface:
+    """Read a model from a binary stream, as `read_surface` does; it cannot refer to other files."""
+    direction = _direction(up)
+    try:
+        data = stream.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise LimitError(f"the input is larger than {MAX_BYTES >> 20} MB")
+        return _make_surface(data, None, "stdin", format, direction, max_faces)
+    except WeathercoatError as error:
+        error.file = error.file or "-"
+        raise
+
+
+def _load(path: Path) -> bytes:
+    """The bytes of a regular file; refuses everything else at once."""
+    try:
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
+            raise AccessError("is a directory")
+        if not stat.S_ISREG(status.st_mode):
+            raise AccessError("is no regular file")
+        if status.st_size > MAX_BYTES:
+            raise LimitError(f"the file has {status.st_size >> 20} MB, the limit is {MAX_BYTES >> 20} MB")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise AccessError("does not exist") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise AccessError(f"cannot be read: {reason}") from None
+
+
+def _make_surface(
+    data: bytes,
+    path: Path | None,
+    name: str,
+    format: str | None,
+    up: tuple[float, float, float] | None,
+    max_faces: int,
+) -> Surface:
+    if not data:
+        raise EmptyFileError("the file has no bytes")
+    extension = Path(name).suffix.lower().removeprefix(".")
+    notes: list[Note] = []
+    if format is not None:
+        kind = format.lower().removeprefix(".")
+    else:
+        kind, note = sniff.identify(data, extension)
+        notes += [note] if note else []
+    if kind == "zip":
+        from weathercoat.mesh.formats.archive import unpack_model
+
+        data, name = unpack_model(data, MAX_BYTES)
+        return _make_surface(data, None, name, None, up, max_faces)
+    polygons = _parse(data, kind, path)
+    polygons.notes[:0] = notes
+    axis = up or _AXES[UP_OF_FORMAT.get(kind, _UP_OF_OTHERS)]
+    return repair(polygons, up=axis, name=Path(name).stem, format=kind, max_faces=max_faces)
+
+
+def _parse(data: bytes, kind: str, path: Path | None) -> Polygons:
+    folder = None if path is None else path.parent
+    if kind == "obj":
+        from weathercoat.mesh.formats.obj import read_obj
+
+        return read_obj(data, folder)
+    if kind == "ply":
+        from weathercoat.mesh.formats.ply import read_ply
+
+        return read_ply(data)
+    if kind == "stl":
+        from weathercoat.mesh.formats.stl import read_stl
+
+        return read_stl(data)
+    if kind == "off":
+        from weathercoat.mesh.formats.off import read_off
+
+        return read_off(data)
+    if kind in ("glb", "gltf"):
+        from weathercoat.mesh.formats.gltf import read_gltf
+
+        return read_gltf(data, folder)
+    from weathercoat.mesh.formats.foreign import read_foreign
+
+    return read_foreign(data, kind)
+
+
+def _direction(up: Up) -> tuple[float, float, float] | None:
+    """A unit vector, or None for "auto"."""
+    if isinstance(up, str):
+        if up == "auto":
+            return None
+        if up.removeprefix("+") not in _AXES:
+            raise UsageError(f"up is {up!r}, but must be auto, x, y, z, -x, -y, -z or a vector")
+        return _AXES[up.removeprefix("+")]
+    vector = np.asarray(up, np.float64)
+    length = np.linalg.norm(vector)
+    if vector.shape != (3,) or not np.isfinite(length) or length == 0:
+        raise UsageError(f"up is {up!r}, but must be a vector of three numbers that is not zero")
+    x, y, z = (vector / length).tolist()
+    return (x, y, z)

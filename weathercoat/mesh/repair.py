@@ -1,0 +1,391 @@
+"""From the polygons of a file to a triangle surface that is an oriented manifold, with a note for each repair.
+
+The order: triangles, weld, faces without area, duplicates, twins, orientation, split vertices. Everything is linear in the
+faces or sorts them. Nothing is filled, moved or invented: positions of the result are positions of the file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.compile import kernel
+from weathercoat.errors import (
+    LimitError,
+    NoAreaError,
+    NoFacesError,
+    NonFiniteError,
+    Note,
+    PrecisionError,
+    ScaleError,
+)
+from weathercoat.mesh import topology
+from weathercoat.mesh.formats.polygons import Polygons
+from weathercoat.mesh.surface import Surface
+from weathercoat.mesh.triangulate import triangulate
+
+Points = NDArray[np.float64]
+Faces = NDArray[np.int32]
+Indices = NDArray[np.int64]
+
+# Spacing of float32 numbers, relative.
+SINGLE = 2.0**-23
+# A shape is refused where its coordinates resolve less than a thousandth of its diagonal.
+MIN_RESOLUTION = 1e-3
+# Between these diagonals, faces of a millionth of the size have areas that float32, in which results are written, can hold.
+MIN_DIAGONAL, MAX_DIAGONAL = 1e-13, 1e13
+# Height of a triangle over its longest edge below which it has no area: the rounding of float32 positions.
+MIN_HEIGHT = SINGLE
+# A model is called soup where more than this share of its faces has no neighbour.
+SOUP_SHARE = 0.5
+MIN_SOUP_FACES = 10
+
+
+def repair(
+    polygons: Polygons, *, up: tuple[float, float, float], name: str, format: str, max_faces: int
+) -> Surface:
+    """The surface of `polygons`: triangles, welded, oriented, every edge of at most two faces, every vertex of one fan.
+
+    Errors: NoFacesError, NonFiniteError, PrecisionError, ScaleError, NoAreaError, LimitError.
+    """
+    notes = list(polygons.notes)
+    if not len(polygons.sizes):
+        raise NoFacesError(
+            "all faces have illegal indices" if notes and notes[-1].code == "W-BADINDEX" else "the model has no faces"
+        )
+    triangle_count = int(np.maximum(polygons.sizes - 2, 0).sum())
+    if triangle_count > max_faces:
+        raise LimitError(f"the model has {triangle_count} triangles, the limit is {max_faces}")
+    referenced = np.zeros(len(polygons.positions), bool)
+    referenced[polygons.corners] = True
+    notes += _drop_nonfinite(polygons)
+    check_precision(polygons.positions[polygons.corners], polygons.single_precision)
+
+    triangles, polygon = triangulate(polygons.positions, polygons.corners, polygons.sizes)
+    too_small = int((polygons.sizes < 3).sum())
+    many = int((polygons.sizes > 3).sum())
+    if many:
+        notes.append(Note("W-POLYGONS", many, f"polygons were cut into {triangle_count} triangles in all"))
+    vertex, kept_vertices, welded = weld(polygons.positions, polygons.corners, polygons.single_precision)
+    if welded and polygons.shared:
+        notes.append(Note("W-WELDED", welded, "vertices at the position of another were merged with it"))
+    if not polygons.shared:
+        referenced[:] = True
+    unreferenced = int((~referenced).sum())
+    if unreferenced:
+        notes.append(Note("W-UNREFERENCED", unreferenced, "vertices that no face uses were dropped"))
+    vertices = polygons.positions[kept_vertices]
+    faces = vertex[triangles].astype(np.int32)
+    uv = None if polygons.uv is None else polygons.uv[triangles]
+    face_group = np.zeros(len(faces), np.int32) if polygons.face_group is None else polygons.face_group[polygon]
+
+    faces, uv, source, degenerate = remove_degenerate(vertices, faces, uv)
+    if degenerate + too_small:
+        notes.append(Note("W-DEGENERATE", degenerate + too_small, "faces without area were removed"))
+    if not len(faces):
+        raise NoAreaError("no face has an area")
+    keep = first_of_duplicates(faces)
+    if not keep.all():
+        notes.append(Note("W-DUPLICATE", int((~keep).sum()), "faces on the vertices of another were dropped"))
+        faces, source, uv = faces[keep], source[keep], None if uv is None else uv[keep]
+
+    faces, flipped, parent, more = make_oriented_manifold(vertices, faces)
+    notes += more
+    if uv is not None:
+        uv[flipped] = uv[flipped][:, [0, 2, 1]]
+    used, compact = np.unique(faces, return_inverse=True)
+    origin = kept_vertices[parent[used]]
+    return Surface(
+        vertices=np.ascontiguousarray(polygons.positions[origin]),
+        faces=compact.reshape(-1, 3).astype(np.int32),
+        face_group=face_group[source].astype(np.int32),
+        groups=polygons.groups,
+        uv=uv,
+        colors=None if polygons.colors is None else np.ascontiguousarray(polygons.colors[origin]),
+        up=up,
+        notes=tuple(notes),
+        name=name,
+        format=format,
+    )
+
+
+def check_precision(points: Points, single_precision: bool) -> None:
+    """Refuse points (k, 3) whose coordinates are too coarse for their extent, too large or too small.
+
+    Errors: PrecisionError, ScaleError, NoAreaError where all points coincide.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    with np.errstate(over="ignore"):
+        diagonal = float(np.linalg.norm(high - low))
+    largest = float(np.abs([low, high]).max())
+    resolution = largest * SINGLE if single_precision else float(np.spacing(largest))
+    if diagonal == 0.0 and (largest == 0.0 or len(points) == 3):
+        raise NoAreaError("all vertices lie at one point")
+    if resolution > MIN_RESOLUTION * diagonal:
+        raise PrecisionError(
+            f"coordinates near {largest:.3g} are stored to {resolution:.2g}, but the model is only {diagonal:.3g} across"
+        )
+    if not MIN_DIAGONAL <= diagonal <= MAX_DIAGONAL:
+        raise ScaleError(
+            f"the model is {diagonal:.3g} across; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} can be worked with"
+        )
+
+
+def weld(positions: Points, corners: Indices, single_precision: bool) -> tuple[Indices, Indices, int]:
+    """Merge the vertices in use that lie at the same position, up to the rounding of float32.
+
+    The tolerance is a box, per axis: the spacing of float32 relative to the model's extent on that axis, since most programs
+    compute in float32 whatever they write; and where the file itself stores float32, its spacing at the largest coordinate.
+    An absolute tolerance, or one for all axes, would collapse tiny, flat or very long models; and no shape can be told
+    apart below this one.
+
+    Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file there; and how
+    many vertices were merged away.
+    """
+    used, compact = np.unique(corners, return_inverse=True)
+    points = np.ascontiguousarray(positions[used])
+    low, high = points.min(axis=0), points.max(axis=0)
+    tolerance = SINGLE * (high - low)
+    if single_precision:
+        tolerance = np.maximum(tolerance, SINGLE * np.maximum(np.abs(low), np.abs(high)))
+    cell = np.where(tolerance > 0, 4.0 * tolerance, 1.0)
+    first = np.empty(len(points), np.int64)
+    _merge_near(points, low, cell, tolerance, first)
+    kept = np.flatnonzero(first == np.arange(len(first)))
+    number = np.empty(len(points), np.int64)
+    number[kept] = np.arange(len(kept))
+    return number[first[compact.ravel()]], used[kept], len(points) - len(kept)
+
+
+def remove_degenerate(
+    vertices: Points, faces: Faces, uv: NDArray[np.float64] | None
+) -> tuple[Faces, NDArray[np.float64] | None, Indices, int]:
+    """Remove the faces without area, and leave no crack where they were.
+
+    A face with a repeated vertex is dropped. One whose corners lie on a line is flipped away with the neighbour across its
+    longest edge, which thereby takes in the middle corner; at a boundary it is dropped.
+    Returns faces, uv, for each face the one whose attributes it has, and how many had no area.
+    """
+    repeated = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    source = np.flatnonzero(~repeated)
+    faces = faces[source]
+    flat = is_flat(vertices, faces)
+    degenerate = int(repeated.sum() + flat.sum())
+    uv = None if uv is None else uv[source]
+    if flat.all():
+        return faces[:0], uv, source[:0], degenerate
+    if flat.any():
+        twin, _ = topology.match_twins(vertices, faces)
+        work_uv = np.zeros((len(faces), 3, 2)) if uv is None else uv
+        taken_from = np.arange(len(faces))
+        _flip_flat(vertices, faces, twin, work_uv, taken_from, np.flatnonzero(flat))
+        keep = ~is_flat(vertices, faces) & ~(faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        faces, source = faces[keep], source[taken_from[keep]]
+        uv = None if uv is None else work_uv[keep]
+    return faces, uv, source, degenerate
+
+
+def is_flat(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
+    """Whether the corners of each face lie on a line: its height is below `MIN_HEIGHT` of its longest edge."""
+    corner = vertices[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    longest = np.max(((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2), axis=1, initial=0.0)
+    return np.linalg.norm(normal, axis=1) <= MIN_HEIGHT * longest  # type: ignore[no-any-return]
+
+
+def first_of_duplicates(faces: Faces) -> NDArray[np.bool_]:
+    """Whether each face is the first on its three vertices, whatever their order."""
+    a, b, c = np.sort(faces, axis=1).T.astype(np.int64)
+    pair = a * (int(faces.max(initial=0)) + 1) + b
+    order = np.lexsort((c, pair))
+    repeats = (pair[order][1:] == pair[order][:-1]) & (c[order][1:] == c[order][:-1])
+    keep = np.ones(len(faces), bool)
+    keep[order[1:][repeats]] = False
+    return keep
+
+
+def make_oriented_manifold(
+    vertices: Points, faces: Faces
+) -> tuple[Faces, NDArray[np.bool_], Indices, list[Note]]:
+    """Orient each component, and split edges of more than two faces and vertices of more than one fan.
+
+    Returns the faces, which of them were turned around (their second and third corner are exchanged), the old vertex of
+    each vertex, and notes on all of this and on boundaries, components and soup.
+    """
+    twin, crowded = topology.match_twins(vertices, faces)
+    orientation = topology.orient(vertices, faces, twin)
+    flipped = orientation.flipped
+    split, parent = topology.split_vertices(len(vertices), faces, orientation.twin)
+    boundary = int((orientation.twin < 0).sum())
+    loops = topology.count_boundary_loops(split, orientation.twin)
+    split[flipped] = split[flipped][:, [0, 2, 1]]
+    component_size = np.bincount(orientation.component)
+    inverted = np.bincount(orientation.component, flipped) == component_size
+    faces_inverted = int(component_size[inverted].sum())
+    faces_flipped = int(flipped.sum()) - faces_inverted
+
+    at_cut = np.zeros(len(vertices), bool)
+    opened = np.flatnonzero((twin >= 0) & (orientation.twin < 0))
+    for h in (crowded, opened):
+        at_cut[faces[h // 3, h % 3]] = True
+        at_cut[faces[h // 3, (h % 3 + 1) % 3]] = True
+    pinched = np.unique(parent[len(vertices) :])
+    pinched = pinched[~at_cut[pinched]]
+
+    alone = int((orientation.twin.reshape(-1, 3) < 0).all(axis=1).sum())
+    is_soup = len(faces) >= MIN_SOUP_FACES and alone > SOUP_SHARE * len(faces)
+    cut = f"components have no two sides and were cut along {orientation.cut} edges"
+    found = (
+        ("W-NONMANIFOLD", len(crowded), "edges of more than two faces were split"),
+        ("W-NONMANIFOLD-VERTEX", len(pinched), "vertices where fans of faces only touch were split"),
+        ("W-NONORIENTABLE", orientation.components_cut, cut),
+        ("W-FLIPPED", faces_flipped, "faces were turned to agree with their neighbours"),
+        ("W-INVERTED", faces_inverted, "faces of components that were inside out were turned"),
+        ("W-BOUNDARY", boundary, f"boundary edges in {loops} loops"),
+        ("W-COMPONENTS", len(component_size) if len(component_size) > 1 else 0, "separate components"),
+        ("W-SOUP", alone if is_soup else 0, "faces have no neighbour: the model is a triangle soup"),
+    )
+    return split, flipped, parent, [Note(code, count, text) for code, count, text in found if count]
+
+
+def _drop_nonfinite(polygons: Polygons) -> list[Note]:
+    """Drop the faces that use a position which is not finite."""
+    broken = ~np.isfinite(polygons.positions).all(axis=1)
+    at_broken = broken[polygons.corners]
+    if not at_broken.any():
+        return []
+    vertices = len(np.unique(polygons.corners[at_broken]))
+    keep = np.ones(len(polygons.sizes), bool)
+    keep[np.repeat(np.arange(len(polygons.sizes)), polygons.sizes)[at_broken]] = False
+    dropped = int((~keep).sum())
+    if not keep.any():
+        raise NonFiniteError(f"all {dropped} faces have a position that is not finite")
+    polygons.keep_faces(keep)
+    return [Note("W-NONFINITE", vertices, f"vertices are not finite; {dropped} faces were dropped with them")]
+
+
+@kernel
+def _merge_near(points, low, cell, tolerance, first):  # type: ignore[no-untyped-def]
+    """`first` (n,) becomes the first point of those kept that lies within the box `tolerance` of each point, or itself.
+
+    A grid of cells in a hash table; only kept points are entered, so that no cell holds more than a few.
+    """
+    n = len(points)
+    size = 16
+    while size < 2 * n:
+        size *= 2
+    head = np.full(size, -1, np.int64)
+    behind = np.full(n, -1, np.int64)
+    for i in range(n):
+        p = points[i]
+        begin0 = np.int64((p[0] - tolerance[0] - low[0]) // cell[0])
+        begin1 = np.int64((p[1] - tolerance[1] - low[1]) // cell[1])
+        begin2 = np.int64((p[2] - tolerance[2] - low[2]) // cell[2])
+        end0 = np.int64((p[0] + tolerance[0] - low[0]) // cell[0])
+        end1 = np.int64((p[1] + tolerance[1] - low[1]) // cell[1])
+        end2 = np.int64((p[2] + tolerance[2] - low[2]) // cell[2])
+        first[i] = i
+        for a in range(begin0, end0 + 1):
+            for b in range(begin1, end1 + 1):
+                for c in range(begin2, end2 + 1):
+                    j = head[_slot(a, b, c, size)]
+                    while j >= 0:
+                        near = True
+                        for k in range(3):
+                            near = near and abs(points[j, k] - p[k]) <= tolerance[k]
+                        if near and j < first[i]:
+                            first[i] = j
+                        j = behind[j]
+        if first[i] == i:
+            slot = _slot(
+                np.int64((p[0] - low[0]) // cell[0]),
+                np.int64((p[1] - low[1]) // cell[1]),
+                np.int64((p[2] - low[2]) // cell[2]),
+                size,
+            )
+            behind[i] = head[slot]
+            head[slot] = i
+
+
+@kernel
+def _slot(a, b, c, size):  # type: ignore[no-untyped-def]
+    """A place in a hash table of `size` (a power of two) for a cell of a grid."""
+    key = np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(c) * np.uint64(0x94D049BB133111EB)
+    key ^= key >> np.uint64(32)
+    return np.int64(key & np.uint64(size - 1))
+
+
+@kernel
+def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-untyped-def]
+    """Flip the faces `flat` with their neighbours, in place; those that cannot be get the vertex 0 three times."""
+    queue = list(flat)
+    budget = 8 * len(flat)
+    position = 0
+    while position < len(queue):
+        f = queue[position]
+        position += 1
+        longest = -1.0
+        i = 0
+        for k in range(3):
+            edge = vertices[faces[f, (k + 1) % 3]] - vertices[faces[f, k]]
+            if np.dot(edge, edge) > longest:
+                longest = np.dot(edge, edge)
+                i = k
+        t = twin[3 * f + i]
+        p, q, b = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
+        if t < 0 or t // 3 == f or faces[t // 3, (t % 3 + 2) % 3] == b or position > budget:
+            _detach(faces, twin, f)
+            continue
+        g, j = t // 3, t % 3
+        # Seen from g its edge runs r to s and its apex is d; b lies between r and s.
+        r, s, d = faces[g, j], faces[g, (j + 1) % 3], faces[g, (j + 2) % 3]
+        along = vertices[s] - vertices[r]
+        share = np.dot(vertices[b] - vertices[r], along) / longest
+        uv_r, uv_s, uv_d = uv[g, j].copy(), uv[g, (j + 1) % 3].copy(), uv[g, (j + 2) % 3].copy()
+        uv_b = uv_r + share * (uv_s - uv_r)
+        side_q = twin[3 * f + (i + 1) % 3]
+        side_p = twin[3 * f + (i + 2) % 3]
+        side_r, side_s = (side_p, side_q) if r == p else (side_q, side_p)
+        beyond_s = twin[3 * g + (j + 1) % 3]
+        beyond_r = twin[3 * g + (j + 2) % 3]
+        # g becomes (r, b, d), f becomes (b, s, d).
+        faces[g, 0], faces[g, 1], faces[g, 2] = r, b, d
+        faces[f, 0], faces[f, 1], faces[f, 2] = b, s, d
+        uv[g, 0], uv[g, 1], uv[g, 2] = uv_r, uv_b, uv_d
+        uv[f, 0], uv[f, 1], uv[f, 2] = uv_b, uv_s, uv_d
+        source[f] = source[g]
+        _connect(twin, 3 * g, side_r)
+        _connect(twin, 3 * g + 2, beyond_r)
+        _connect(twin, 3 * f, side_s)
+        _connect(twin, 3 * f + 1, beyond_s)
+        _connect(twin, 3 * g + 1, 3 * f + 2)
+        for face in (f, g):
+            if _is_flat(vertices, faces, face):
+                queue.append(face)
+
+
+@kernel
+def _connect(twin, h, t):  # type: ignore[no-untyped-def]
+    twin[h] = t
+    if t >= 0:
+        twin[t] = h
+
+
+@kernel
+def _detach(faces, twin, f):  # type: ignore[no-untyped-def]
+    """Take a face out: its neighbours end there."""
+    for h in range(3 * f, 3 * f + 3):
+        if twin[h] >= 0:
+            twin[twin[h]] = -1
+        twin[h] = -1
+    faces[f, 0] = faces[f, 1] = faces[f, 2] = 0
+
+
+@kernel
+def _is_flat(vertices, faces, f):  # type: ignore[no-untyped-def]
+    a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+    normal = np.cross(b - a, c - a)
+    longest = max(np.dot(b - a, b - a), np.dot(c - b, c - b), np.dot(a - c, a - c))
+    return np.sqrt(np.dot(normal, normal)) <= MIN_HEIGHT * longest

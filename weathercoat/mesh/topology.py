@@ -1,0 +1,248 @@
+"""Which faces meet where: twins, one orientation for each component, and the vertices that this leaves.
+
+Half-edge h = 3 f + i runs from corner i of face f to the next. All functions take and return plain arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.compile import kernel
+
+Ints = NDArray[np.int64]
+Faces = NDArray[np.int32]
+Points = NDArray[np.float64]
+
+
+@dataclass
+class Orientation:
+    """One orientation a component.
+
+    twin: (3 m,) after cutting; component: (m,); flipped: (m,) faces to turn around; cut: edges where a component that
+    cannot be oriented was opened; components_cut: how many components that concerns.
+    """
+
+    twin: Ints
+    component: Ints
+    flipped: NDArray[np.bool_]
+    cut: int
+    components_cut: int
+
+
+def match_twins(vertices: Points, faces: Faces) -> tuple[Ints, Ints]:
+    """The half-edge on the other side of each, (3 m,), -1 at a boundary; and one half-edge of each edge of more than two faces.
+
+    The faces around such an edge are paired two by two: first those that agree in orientation, the straightest first; what
+    is left over ends there, and so do all faces around an edge of more than 64.
+    """
+    tail = faces.ravel().astype(np.int64)
+    head = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    key = np.minimum(tail, head) * (len(vertices) + 1) + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    begin = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
+    count = np.diff(np.append(begin, len(key)))
+    twin = np.full(len(tail), -1, np.int64)
+    two = begin[count == 2]
+    twin[order[two]] = order[two + 1]
+    twin[order[two + 1]] = order[two]
+    many = np.flatnonzero(count > 2)
+    _pair(vertices, faces, order, begin[many], count[many], twin)
+    return twin, order[begin[many]]
+
+
+def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
+    """The same orientation throughout each component: outward where it is closed, else that of the greater area.
+
+    A component that cannot be oriented is cut along the edges where its orientations meet.
+    """
+    twin = twin.copy()
+    component = np.full(len(faces), -1, np.int64)
+    turned = np.zeros(len(faces), np.bool_)
+    queue = np.empty(len(faces), np.int64)
+    components = _spread_orientation(faces, twin, component, turned, queue)
+    cut_component = np.zeros(components, bool)
+    contradicting = _contradictions(faces, twin, turned)
+    cut_component[component[contradicting // 3]] = True
+    other = twin[contradicting]
+    twin[contradicting] = -1
+    twin[other] = -1
+    corner = vertices[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = 0.5 * np.linalg.norm(normal, axis=1)
+    sign = np.where(turned, -1.0, 1.0)
+    total = np.bincount(component, area, components)
+    kept = np.bincount(component, area * sign, components)
+    # Volumes about the middle of each component, so that a far origin costs no digits.
+    middle = np.stack([np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1)
+    middle /= np.bincount(component, minlength=components)[:, None]
+    arm = corner.mean(axis=1) - middle[component]
+    volume = np.bincount(component, sign * np.einsum("ij,ij->i", arm, normal) / 6.0, components)
+    closed = np.bincount(component, (twin.reshape(-1, 3) < 0).any(axis=1), components) == 0
+    solid = closed & (np.abs(volume) > 1e-12 * total**1.5)
+    turn_component = np.where(solid, volume < 0, kept < 0)
+    return Orientation(
+        twin=twin,
+        component=component,
+        flipped=turned ^ turn_component[component],
+        cut=len(contradicting) // 2,
+        components_cut=int(cut_component.sum()),
+    )
+
+
+def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, Ints]:
+    """Faces in which every vertex has one fan: corners that no common edge joins get vertices of their own.
+
+    Returns the faces (m, 3) and the old vertex of each new vertex; the first fan of a vertex keeps its number.
+    """
+    fan = np.arange(3 * len(faces))
+    _join_fans(faces, twin, fan)
+    old = faces.ravel()
+    is_root = fan == np.arange(len(fan))
+    roots = np.flatnonzero(is_root)
+    by_vertex = roots[np.argsort(old[roots], kind="stable")]
+    vertex = old[by_vertex]
+    first = np.concatenate([[True], vertex[1:] != vertex[:-1]]) if len(vertex) else np.zeros(0, bool)
+    number = np.empty(len(fan), np.int64)
+    number[by_vertex[first]] = vertex[first]
+    extra = np.sort(by_vertex[~first])
+    number[extra] = vertex_count + np.arange(len(extra))
+    parent = np.concatenate([np.arange(vertex_count), old[extra]])
+    return number[fan].reshape(-1, 3).astype(np.int32), parent
+
+
+def count_boundary_loops(faces: Faces, twin: Ints) -> int:
+    """The number of closed chains of boundary edges, in faces whose vertices have one fan each."""
+    boundary = np.flatnonzero(twin < 0)
+    tail = faces.ravel()[boundary]
+    head = np.roll(faces, -1, axis=1).ravel()[boundary]
+    vertices, ends = np.unique(np.concatenate([tail, head]), return_inverse=True)
+    label = np.arange(len(vertices))
+    _unite(label, ends.reshape(2, -1))
+    return int((label == np.arange(len(label))).sum())
+
+
+@kernel
+def _pair(vertices, faces, order, begin, count, twin):  # type: ignore[no-untyped-def]
+    """Pair the half-edges order[begin : begin + count] around each edge; entries of `twin` are set in place."""
+    apex = np.empty((64, 3))
+    forward = np.empty(64, np.bool_)
+    for e in range(len(begin)):
+        n = count[e]
+        if n > 64:
+            continue
+        around = order[begin[e] : begin[e] + n]
+        h = around[0]
+        tail = faces[h // 3, h % 3]
+        a = vertices[tail]
+        axis = vertices[faces[h // 3, (h % 3 + 1) % 3]] - a
+        for i in range(n):
+            h = around[i]
+            forward[i] = faces[h // 3, h % 3] == tail
+            arm = vertices[faces[h // 3, (h % 3 + 2) % 3]] - a
+            arm = arm - axis * (np.dot(arm, axis) / np.dot(axis, axis))
+            apex[i] = arm / np.sqrt(np.dot(arm, arm))
+        for agreeing in (True, False):
+            while True:
+                best = 2.0
+                left, right = -1, -1
+                for i in range(n):
+                    for j in range(i):
+                        if twin[around[i]] >= 0 or twin[around[j]] >= 0 or (forward[i] != forward[j]) != agreeing:
+                            continue
+                        one, other = (apex[i], apex[j]) if forward[i] else (apex[j], apex[i])
+                        # Of pairs that bend alike, ridges first: they keep two touching solids apart.
+                        bend = np.dot(one, other)
+                        if np.dot(axis, np.cross(one, other)) > 0:
+                            bend += 1e-6
+                        if bend < best:
+                            best = bend
+                            left, right = i, j
+                if left < 0:
+                    break
+                twin[around[left]] = around[right]
+                twin[around[right]] = around[left]
+
+
+@kernel
+def _agree(faces, h, t):  # type: ignore[no-untyped-def]
+    """Whether the faces of two half-edges of one edge run along it in opposite directions, as neighbours should."""
+    return faces[h // 3, h % 3] != faces[t // 3, t % 3]
+
+
+@kernel
+def _spread_orientation(faces, twin, component, turned, queue):  # type: ignore[no-untyped-def]
+    """Number the components, and mark the faces that are turned against the first face of theirs; breadth first."""
+    components = 0
+    for seed in range(len(faces)):
+        if component[seed] >= 0:
+            continue
+        component[seed] = components
+        queue[0] = seed
+        head = 0
+        tail = 1
+        while head < tail:
+            f = queue[head]
+            head += 1
+            for h in range(3 * f, 3 * f + 3):
+                t = twin[h]
+                if t >= 0 and component[t // 3] < 0:
+                    component[t // 3] = components
+                    turned[t // 3] = turned[f] ^ (not _agree(faces, h, t))
+                    queue[tail] = t // 3
+                    tail += 1
+        components += 1
+    return components
+
+
+@kernel
+def _contradictions(faces, twin, turned):  # type: ignore[no-untyped-def]
+    """The half-edges, both of each edge, across which orientations differ after spreading."""
+    found = np.zeros(len(twin), np.bool_)
+    for h in range(len(twin)):
+        t = twin[h]
+        if t >= 0:
+            found[h] = (turned[h // 3] ^ turned[t // 3]) == _agree(faces, h, t)
+    return np.flatnonzero(found)
+
+
+@kernel
+def _unite(label, pairs):  # type: ignore[no-untyped-def]
+    """Union-find: `label` becomes a forest whose roots are the smallest of each set; pairs (2, k)."""
+    for k in range(pairs.shape[1]):
+        a, b = pairs[0, k], pairs[1, k]
+        while label[a] != a:
+            label[a] = label[label[a]]
+            a = label[a]
+        while label[b] != b:
+            label[b] = label[label[b]]
+            b = label[b]
+        label[max(a, b)] = min(a, b)
+
+
+@kernel
+def _join_fans(faces, twin, fan):  # type: ignore[no-untyped-def]
+    """Union-find over corners (3 m,): `fan` becomes the smallest corner of the fan around the same vertex."""
+    for h in range(len(twin)):
+        t = twin[h]
+        if t < h:
+            continue
+        after_h = h - 2 if h % 3 == 2 else h + 1
+        after_t = t - 2 if t % 3 == 2 else t + 1
+        if faces[h // 3, h % 3] == faces[t // 3, t % 3]:
+            pairs = ((h, t), (after_h, after_t))
+        else:
+            pairs = ((h, after_t), (after_h, t))
+        for a, b in pairs:
+            while fan[a] != a:
+                fan[a] = fan[fan[a]]
+                a = fan[a]
+            while fan[b] != b:
+                fan[b] = fan[fan[b]]
+                b = fan[b]
+            fan[max(a, b)] = min(a, b)
+    for h in range(len(fan)):
+        fan[h] = fan[fan[h]]
