@@ -144,13 +144,14 @@ def _pack(
     hinge_edges: Indices,
 ) -> tuple[int, int]:
     """Collect the active lengths and hinges in the fixed order; returns their numbers."""
+    tail, twin, alive = mesh.tail, mesh.twin, mesh.alive
     lengths = 0
     angles = 0
     for h in order:
-        g = mesh.twin[h]
-        if not mesh.alive[h // 3] or (0 <= g < h):
+        g = twin[h]
+        if not alive[h // 3] or (0 <= g < h):
             continue
-        a, b = mesh.tail[h], mesh.tail[next_of(h)]
+        a, b = tail[h], tail[next_of(h)]
         if inverse_mass[a] + inverse_mass[b] > 0.0:
             length_ends[lengths, 0] = a
             length_ends[lengths, 1] = b
@@ -159,8 +160,8 @@ def _pack(
         if g >= 0 and not math.isnan(angle_start[h]):
             hinges[angles, 0] = a
             hinges[angles, 1] = b
-            hinges[angles, 2] = mesh.tail[prev_of(h)]
-            hinges[angles, 3] = mesh.tail[prev_of(g)]
+            hinges[angles, 2] = tail[prev_of(h)]
+            hinges[angles, 3] = tail[prev_of(g)]
             hinge_edges[angles] = h
             angles += 1
     return lengths, angles

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.film.fracture import break_edge
@@ -11,38 +14,51 @@ from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, drop_face
 from weathercoat.mesh.surface import Indices, Vectors
 
 
-def flake(mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParameters, age: float, log: EventLog) -> Vectors:
+def flake(
+    mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParameters, age: float, released: int, log: EventLog
+) -> Vectors:
     """Let fall what nothing holds; appends to the log and returns the rest area of each flake, (k,), in square sizes.
 
     Literally only a face whose three edges are broken falls. By default a connected piece that no attached vertex holds
-    falls as a whole, and so does one that hangs by less than a share of its outline: it tears off.
+    falls as a whole, and so does one that hangs by less than a share of its outline: it tears off. Nothing can fall in a step
+    in which nothing broke and no vertex was released.
     """
+    face_count = len(mesh.alive)
+    areas = np.empty(face_count)
+    if released == 0 and log.counts[1] == 0:
+        return areas[:0]
     if parameters.flaking_rule == "faces":
-        areas = np.empty(len(mesh.alive))
         return areas[: drop_loose_faces(mesh, log, areas)].copy()
-    scratch = np.full(len(mesh.alive), -1, np.int32), np.empty(len(mesh.alive), np.int32), np.empty(len(mesh.alive))
-    rules = make_film_rules(parameters)
+    free, seen = np.empty(face_count, np.bool_), np.empty(face_count, np.bool_)
+    queue = np.empty(face_count, np.int32)
+    find_free_faces(mesh, state, free)
     if parameters.flaking_hanging_share > 0.0:
-        tear_hanging_pieces(mesh, state, rules, parameters.flaking_hanging_share, age, log, scratch[0], scratch[1])
-        scratch[0][:] = -1
-    return scratch[2][: drop_islands(mesh, state, log, *scratch)].copy()
+        rules = make_film_rules(parameters)
+        tear_hanging_pieces(mesh, state, rules, parameters.flaking_hanging_share, age, log, free, seen, queue)
+    return areas[: drop_islands(mesh, log, free, seen, queue, areas)].copy()
+
+
+@kernel
+def rest_edge_length(mesh: HalfEdgeMesh, h: int) -> float:
+    """Length of the edge of half-edge h at rest."""
+    a, b = mesh.faces[h // 3, h % 3], mesh.faces[h // 3, (h + 1) % 3]
+    squared = 0.0
+    for axis in range(3):
+        squared += (mesh.rest_positions[a, axis] - mesh.rest_positions[b, axis]) ** 2
+    return math.sqrt(squared)
 
 
 @kernel
 def rest_face_area(mesh: HalfEdgeMesh, f: int) -> float:
     """Area of face f at rest."""
-    a = mesh.rest_positions[mesh.faces[f, 0]]
-    b = mesh.rest_positions[mesh.faces[f, 1]]
-    c = mesh.rest_positions[mesh.faces[f, 2]]
-    normal = np.cross(b - a, c - a)
-    return 0.5 * np.sqrt(np.dot(normal, normal))
-
-
-@kernel
-def rest_edge_length(mesh: HalfEdgeMesh, h: int) -> float:
-    """Length of the edge of h at rest."""
-    d = mesh.rest_positions[mesh.faces[h // 3, h % 3]] - mesh.rest_positions[mesh.faces[h // 3, (h + 1) % 3]]
-    return np.sqrt(np.dot(d, d))
+    a, b, c = mesh.faces[f, 0], mesh.faces[f, 1], mesh.faces[f, 2]
+    squared = 0.0
+    for axis in range(3):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        ui, uj = mesh.rest_positions[b, i] - mesh.rest_positions[a, i], mesh.rest_positions[b, j] - mesh.rest_positions[a, j]
+        vi, vj = mesh.rest_positions[c, i] - mesh.rest_positions[a, i], mesh.rest_positions[c, j] - mesh.rest_positions[a, j]
+        squared += (ui * vj - uj * vi) ** 2
+    return 0.5 * math.sqrt(squared)
 
 
 @kernel
@@ -59,48 +75,69 @@ def drop_loose_faces(mesh: HalfEdgeMesh, log: EventLog, areas: Vectors) -> int:
 
 
 @kernel
-def is_free(mesh: HalfEdgeMesh, state: FilmState, f: int) -> bool:
-    """Whether all three corners of face f have separated."""
-    h = 3 * f
-    separated = state.separated
-    return separated[mesh.tail[h]] and separated[mesh.tail[h + 1]] and separated[mesh.tail[h + 2]]
+def find_free_faces(mesh: HalfEdgeMesh, state: FilmState, free: NDArray[np.bool_]) -> None:
+    """Mark in free (m,) the live faces whose three corners have separated."""
+    tail, alive, separated = mesh.tail, mesh.alive, state.separated
+    for f in range(len(free)):
+        h = 3 * f
+        free[f] = alive[f] and separated[tail[h]] and separated[tail[h + 1]] and separated[tail[h + 2]]
+
+
+@kernel
+def collect_piece(
+    seed: int, twin: Indices, free: NDArray[np.bool_], seen: NDArray[np.bool_], queue: Indices
+) -> tuple[int, bool]:
+    """Collect the connected free faces round `seed` in queue and mark them seen.
+
+    Returns their number, and whether they touch a face that is not free: one with an attached corner.
+    """
+    held = False
+    queue[0] = seed
+    seen[seed] = True
+    first, last = 0, 1
+    while first < last:
+        f = queue[first]
+        first += 1
+        for h in range(3 * f, 3 * f + 3):
+            g = twin[h]
+            if g < 0:
+                continue
+            if not free[g // 3]:
+                held = True
+            elif not seen[g // 3]:
+                seen[g // 3] = True
+                queue[last] = g // 3
+                last += 1
+    return last, held
 
 
 @kernel
 def drop_islands(
-    mesh: HalfEdgeMesh, state: FilmState, log: EventLog, piece: Indices, queue: Indices, areas: Vectors
+    mesh: HalfEdgeMesh,
+    log: EventLog,
+    free: NDArray[np.bool_],
+    seen: NDArray[np.bool_],
+    queue: Indices,
+    areas: Vectors,
 ) -> int:
     """Delete each connected piece that has no attached vertex; returns their number, and their areas in `areas`.
 
-    piece: scratch (m,) of -1; queue: scratch (m,).
+    free: (m,) of `find_free_faces`; seen, queue: scratch (m,).
     """
+    twin = mesh.twin
+    seen[:] = False
     found = 0
-    for seed in range(len(mesh.alive)):
-        if not mesh.alive[seed] or piece[seed] >= 0 or not is_free(mesh, state, seed):
+    for seed in range(len(free)):
+        if seen[seed] or not free[seed]:
             continue
-        held = False
-        area = 0.0
-        queue[0] = seed
-        piece[seed] = seed
-        head, tail = 0, 1
-        while head < tail:
-            f = queue[head]
-            head += 1
-            area += rest_face_area(mesh, f)
-            for h in range(3 * f, 3 * f + 3):
-                g = mesh.twin[h]
-                if g >= 0 and piece[g // 3] != seed:
-                    if is_free(mesh, state, g // 3):
-                        piece[g // 3] = seed
-                        queue[tail] = g // 3
-                        tail += 1
-                    else:
-                        held = True
-        if not held:
-            areas[found] = area
-            found += 1
-            for i in range(tail):
-                drop_face(mesh, log, queue[i])
+        count, held = collect_piece(seed, twin, free, seen, queue)
+        if held:
+            continue
+        areas[found] = 0.0
+        for i in range(count):
+            areas[found] += rest_face_area(mesh, queue[i])
+            drop_face(mesh, log, queue[i])
+        found += 1
     return found
 
 
@@ -112,40 +149,35 @@ def tear_hanging_pieces(
     share: float,
     age: float,
     log: EventLog,
-    piece: Indices,
+    free: NDArray[np.bool_],
+    seen: NDArray[np.bool_],
     queue: Indices,
 ) -> None:
     """Break the last edges of each free piece that hangs by less than `share` of its outline.
 
-    A piece is a connected set of faces whose corners have all separated; it hangs by the edges that it shares with faces
-    that still have an attached corner. piece: scratch (m,) of -1; queue: scratch (m,).
+    A piece hangs by the edges that it shares with faces that still have an attached corner. free: (m,) of
+    `find_free_faces`; seen, queue: scratch (m,).
     """
-    stack = np.empty(len(mesh.twin), np.int32)
-    for seed in range(len(mesh.alive)):
-        if not mesh.alive[seed] or piece[seed] >= 0 or not is_free(mesh, state, seed):
+    twin = mesh.twin
+    stack = np.empty(len(twin), np.int32)
+    seen[:] = False
+    for seed in range(len(free)):
+        if seen[seed] or not free[seed]:
+            continue
+        count, held = collect_piece(seed, twin, free, seen, queue)
+        if not held:
             continue
         outline = 0.0
         hanging = 0.0
-        queue[0] = seed
-        piece[seed] = seed
-        head, tail = 0, 1
-        while head < tail:
-            f = queue[head]
-            head += 1
-            for h in range(3 * f, 3 * f + 3):
-                g = mesh.twin[h]
-                if g < 0:
+        for i in range(count):
+            for h in range(3 * queue[i], 3 * queue[i] + 3):
+                if twin[h] < 0:
                     outline += rest_edge_length(mesh, h)
-                elif not is_free(mesh, state, g // 3):
-                    outline += rest_edge_length(mesh, h)
+                elif not free[twin[h] // 3]:
                     hanging += rest_edge_length(mesh, h)
-                elif piece[g // 3] != seed:
-                    piece[g // 3] = seed
-                    queue[tail] = g // 3
-                    tail += 1
-        if 0.0 < hanging < share * outline:
-            for i in range(tail):
-                for h in range(3 * queue[i], 3 * queue[i] + 3):
-                    g = mesh.twin[h]
-                    if g >= 0 and not is_free(mesh, state, g // 3):
-                        break_edge(mesh, state, rules, age, h, log, stack)
+        if hanging >= share * (outline + hanging):
+            continue
+        for i in range(count):
+            for h in range(3 * queue[i], 3 * queue[i] + 3):
+                if twin[h] >= 0 and not free[twin[h] // 3]:
+                    break_edge(mesh, state, rules, age, h, log, stack)

@@ -8,7 +8,7 @@ import numpy as np
 
 from weathercoat.compile import kernel
 from weathercoat.film.state import FilmParameters, FilmRules, FilmState, inherit_film, make_film_rules
-from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, next_of
+from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge
 from weathercoat.mesh.surface import Indices, Vectors
 
 _REACH = 3.0  # shear lags beyond which a crack no longer unloads the film: exp(-3) is 5 %
@@ -69,16 +69,15 @@ def cohesion_at(state: FilmState, rules: FilmRules, h: int, age: float) -> float
 @kernel
 def leads_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, tip: int, other: int) -> bool:
     """Whether the edge from `tip` to `other` continues the crack that ends in `tip`; false where it is no tip."""
+    if not state.is_tip[tip]:
+        return False
     dot = 0.0
     length = 0.0
-    directed = False
     for axis in range(3):
-        along = state.crack_direction[tip, axis]
         step = mesh.rest_positions[mesh.origin[other], axis] - mesh.rest_positions[mesh.origin[tip], axis]
-        directed = directed or along != 0.0
-        dot += along * step
+        dot += state.crack_direction[tip, axis] * step
         length += step * step
-    return directed and dot >= rules.direction_threshold * math.sqrt(length)
+    return dot >= rules.direction_threshold * math.sqrt(length)
 
 
 @kernel
@@ -86,11 +85,24 @@ def find_overloaded(
     mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, age: float, candidates: Indices, overload: Vectors
 ) -> int:
     """Collect the edges that break at an age, by their smaller half-edge, with their overload; returns how many."""
+    tail, twin, separated, is_tip = mesh.tail, mesh.twin, state.separated, state.is_tip
+    tension, cohesion, fray_age = state.tension_now, state.cohesion, state.fray_age
+    most_frayed = math.exp(-rules.cohesion_decay_rate * age)
     found = 0
-    for h in range(len(mesh.twin)):
-        if mesh.twin[h] < h:
+    for h in range(len(twin)):
+        g = twin[h]
+        if g < h:
             continue
-        if not (state.separated[mesh.tail[h]] and state.separated[mesh.tail[next_of(h)]]):
+        a, b = tail[h], tail[g]
+        if not (separated[a] and separated[b]):
+            continue
+        # what the edge cannot fall below is cheap to know, and settles most edges
+        least = min(cohesion[h], cohesion[g])
+        if fray_age[h // 3] < age or fray_age[g // 3] < age:
+            least *= most_frayed
+        if is_tip[a] or is_tip[b]:
+            least *= rules.direction_factor
+        if tension[h // 3] + tension[g // 3] <= least:
             continue
         load = edge_overload(mesh, state, rules, h, age)
         if load > 1.0:
@@ -143,6 +155,7 @@ def break_edge(
 @kernel
 def point_tip(mesh: HalfEdgeMesh, state: FilmState, tip: int, source: int, target: int) -> None:
     """Record at `tip` the direction of the crack that ends there, on the rest surface from origin `source`."""
+    state.is_tip[tip] = True
     length = 0.0
     for axis in range(3):
         length += (mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]) ** 2

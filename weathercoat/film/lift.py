@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from weathercoat.compile import kernel
 from weathercoat.film.state import FilmState
 from weathercoat.mesh.dihedral import half_edge_bend
@@ -12,18 +15,25 @@ from weathercoat.mesh.surface import Indices, Vectors
 
 
 @kernel
-def lift_factor_now(mesh: HalfEdgeMesh, state: FilmState, h: int, convexity: float) -> float:
+def lift_factor_now(
+    h: int,
+    positions: Vectors,
+    tail: Indices,
+    twin: Indices,
+    separated: NDArray[np.bool_],
+    rest_factor: Vectors,
+    convexity: float,
+) -> float:
     """1 / (1 + exp(-a (phi - pi))) of half-edge h with its present dihedral; one without a twin lifts as if flat.
 
     The apex of h is attached. Where the other three corners of the hinge are too, it has not moved since the start.
     """
-    g = mesh.twin[h]
+    g = twin[h]
     if g < 0:
         return 0.5
-    separated = state.separated
-    if not (separated[mesh.tail[h]] or separated[mesh.tail[next_of(h)]] or separated[mesh.tail[prev_of(g)]]):
-        return state.lift_factor[h]
-    return 1.0 / (1.0 + math.exp(-convexity * half_edge_bend(h, mesh.positions, mesh.tail, mesh.twin)))
+    if not (separated[tail[h]] or separated[tail[next_of(h)]] or separated[tail[prev_of(g)]]):
+        return rest_factor[h]
+    return 1.0 / (1.0 + math.exp(-convexity * half_edge_bend(h, positions, tail, twin)))
 
 
 @kernel
@@ -41,15 +51,18 @@ def sum_lift(
     face_tension: (m,), the tension that lifts. per_valence scales the sum to six half-edges, so that valence and rim do
     not matter. opposite_count is scratch (n,). The lift itself is k times the result.
     """
+    positions, tail, twin, alive = mesh.positions, mesh.tail, mesh.twin, mesh.alive
+    separated, rest_factor = state.separated, state.lift_factor
     out[:] = 0.0
     opposite_count[:] = 0
-    for f in range(len(mesh.alive)):
-        if not mesh.alive[f]:
+    for f in range(len(alive)):
+        if not alive[f]:
             continue
         for h in range(3 * f, 3 * f + 3):
-            apex = mesh.tail[prev_of(h)]
-            if not state.separated[apex]:
-                out[apex] += face_tension[f] * lift_factor_now(mesh, state, h, convexity)
+            apex = tail[prev_of(h)]
+            if not separated[apex]:
+                factor = lift_factor_now(h, positions, tail, twin, separated, rest_factor, convexity)
+                out[apex] += face_tension[f] * factor
                 opposite_count[apex] += 1
     if per_valence:
         for v in range(len(out)):

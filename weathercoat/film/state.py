@@ -75,7 +75,8 @@ class FilmState(NamedTuple):
     """State of the film, plain arrays. n0 rest vertices, m faces; arrays over vertices have the capacity 3 m.
 
     Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite while attached;
-    crack_direction (3 m, 3), a unit vector on the rest surface where the vertex is the tip of one crack, else zero.
+    is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3) there, a unit vector on the
+    rest surface.
     Faces: tension, tension_age, tension_cap (m,): the value at its last event, the age of it, and what it tends to;
     tension_now (m,), evaluated at the age of the step; fray_age (m,), when the face got its first broken edge, infinite
     before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie
@@ -86,6 +87,7 @@ class FilmState(NamedTuple):
     adhesion: Vectors
     separated: NDArray[np.bool_]
     separation_age: Vectors
+    is_tip: NDArray[np.bool_]
     crack_direction: Vectors
     tension: Vectors
     tension_age: Vectors
@@ -136,6 +138,7 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
         adhesion=p.adhesion_base + p.adhesion_amplitude * noise,
         separated=np.zeros(capacity, np.bool_),
         separation_age=np.full(capacity, np.inf),
+        is_tip=np.zeros(capacity, np.bool_),
         crack_direction=np.zeros((capacity, 3)),
         tension=np.full(face_count, p.tension_initial),
         tension_age=np.zeros(face_count),
@@ -173,10 +176,9 @@ def tension_at(value: float, since: float, cap: float, rate: float, saturating: 
 @kernel
 def evaluate_tension(state: FilmState, rules: FilmRules, age: float) -> None:
     """Bring `tension_now` of every face to an age."""
-    for f in range(len(state.tension)):
-        state.tension_now[f] = tension_at(
-            state.tension[f], state.tension_age[f], state.tension_cap[f], rules.tension_rate, rules.saturating, age
-        )
+    tension, tension_age, tension_cap, now = state.tension, state.tension_age, state.tension_cap, state.tension_now
+    for f in range(len(now)):
+        now[f] = tension_at(tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age)
 
 
 def drying_tension(parameters: FilmParameters, age: float) -> float:
@@ -197,5 +199,5 @@ def inherit_film(state: FilmState, log: EventLog, first: int) -> None:
         new, parent = log.splits[i, 0], log.splits[i, 1]
         state.separated[new] = state.separated[parent]
         state.separation_age[new] = state.separation_age[parent]
-        state.crack_direction[new] = 0.0
-        state.crack_direction[parent] = 0.0
+        state.is_tip[new] = False
+        state.is_tip[parent] = False

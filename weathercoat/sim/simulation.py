@@ -96,7 +96,8 @@ class Simulation:
 
         fracture(self.mesh, self.film, self.film_parameters, age, tick, self.log)
 
-        self.flake_areas.extend(flake(self.mesh, self.film, self.film_parameters, age, self.log).tolist())
+        fallen = flake(self.mesh, self.film, self.film_parameters, age, len(separating), self.log)
+        self.flake_areas.extend(fallen.tolist())
         follow_events(self.constraints, self.log)
         decided = time.perf_counter()
 
