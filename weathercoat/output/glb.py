@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from weathercoat import __version__
-from weathercoat.mesh.surface import Indices, Surface, Vectors, vertex_normals
+from weathercoat.mesh.surface import Indices, Vectors
 
 FLOAT, UINT32 = 5126, 5125
 VERTEX_TARGET, INDEX_TARGET = 34962, 34963
@@ -34,16 +34,14 @@ class Material:
 
 
 @dataclass(frozen=True)
-class Part:
-    """One node with one mesh.
+class Sheet:
+    """Triangles of one material, k vertices and m faces: a primitive of glTF.
 
-    vertices (n, 3), in the axes of the model; faces (m, 3); normals (n, 3), unit; colors (n, 3), linear RGB 0
-    to 1, or None; uv (n, 2), origin at the lower left as in OBJ, or None; scalars: custom attributes (n,),
-    their names beginning with an underscore. A part without faces becomes a node without a mesh, since glTF
-    has no empty ones.
+    vertices (k, 3), in the axes of the model; faces (m, 3); normals (k, 3), unit; colors (k, 3), linear RGB 0
+    to 1, or None; uv (k, 2), origin at the lower left as in OBJ, or None; scalars: custom attributes (k,),
+    whose names begin with an underscore.
     """
 
-    name: str
     material: Material
     vertices: Vectors
     faces: Indices
@@ -53,48 +51,53 @@ class Part:
     scalars: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Node:
+    """A named node with one mesh. Sheets without faces are left out, since glTF has no empty ones."""
+
+    name: str
+    sheets: Sequence[Sheet]
+
+
 def write_glb(
     target: Path | str | BinaryIO,
-    parts: Sequence[Part],
+    nodes: Sequence[Node],
     *,
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     extras: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write parts as one GLB file to a path or a binary stream.
+    """Write nodes as one GLB file to a path or a binary stream.
 
     glTF is y-up: everything is turned by the smallest rotation that takes `up` there. Positions are 32-bit
-    floats about the centre of all parts, which the root node moves back, so that a model far from its origin
-    keeps its shape. Raises OSError where the target cannot be written.
+    floats about the centre of all vertices, to which the root node moves them, so that a model far from its
+    origin keeps its shape. Raises OSError where the target cannot be written.
     """
     rotation = rotation_to_y(up)
-    used = [part.vertices for part in parts if len(part.faces)]
-    if used:
-        lowest = np.min([vertices.min(axis=0) for vertices in used], axis=0)
-        highest = np.max([vertices.max(axis=0) for vertices in used], axis=0)
-        center = 0.5 * (lowest + highest)
-    else:
-        center = np.zeros(3)
-    buffer = _Buffer()
-    root: dict[str, Any] = {"name": "model", "children": list(range(1, len(parts) + 1))}
-    root["translation"] = [float(x) for x in rotation @ center]
-    nodes: list[dict[str, Any]] = [root]
+    center = _center([sheet.vertices for node in nodes for sheet in node.sheets if len(sheet.faces)])
+    buffer = _Buffer(center, rotation)
+    root: dict[str, Any] = {"name": "model", "translation": [float(x) for x in rotation @ center]}
+    entries: list[dict[str, Any]] = [root]
     meshes: list[dict[str, Any]] = []
     materials: list[Material] = []
-    for part in parts:
-        node: dict[str, Any] = {"name": part.name}
-        if len(part.faces):
-            node["mesh"] = len(meshes)
-            if part.material not in materials:
-                materials.append(part.material)
-            primitive = buffer.add_part(part, center, rotation)
-            primitive["material"] = materials.index(part.material)
-            meshes.append({"name": part.name, "primitives": [primitive]})
-        nodes.append(node)
+    for node in nodes:
+        entry: dict[str, Any] = {"name": node.name}
+        sheets = [sheet for sheet in node.sheets if len(sheet.faces)]
+        primitives = []
+        for sheet in sheets:
+            if sheet.material not in materials:
+                materials.append(sheet.material)
+            primitives.append({**buffer.add_sheet(sheet), "material": materials.index(sheet.material)})
+        if primitives:
+            entry["mesh"] = len(meshes)
+            meshes.append({"name": node.name, "primitives": primitives})
+        entries.append(entry)
+    if nodes:
+        root["children"] = list(range(1, len(entries)))
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": f"weathercoat {__version__}", "extras": dict(extras or {})},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": nodes,
+        "nodes": entries,
     }
     if meshes:
         document["meshes"] = meshes
@@ -110,79 +113,52 @@ def write_glb(
         target.writelines(chunks)
 
 
-def surface_parts(surface: Surface) -> list[Part]:
-    """One GLB part for each group of the surface that has faces."""
-    parts = []
-    for number, name in enumerate(surface.groups):
-        chosen = surface.face_group == number
-        if not chosen.any():
-            continue
-        group = surface.select_faces(chosen)
-        normals = vertex_normals(group.vertices, group.faces)
-        faces, source, uv = group.faces, np.arange(len(group.vertices)), None
-        if group.uv is not None:
-            faces, source, uv = split_at_seams(group)
-        colors = None if group.colors is None else srgb_to_linear(group.colors[source, :3])
-        shade = 1.0 if colors is not None else 0.5
-        material = Material(name, metallic=0.0, roughness=0.6, double_sided=True, base_color=(shade,) * 3)
-        parts.append(Part(name, material, group.vertices[source], faces, normals[source], colors, uv))
-    return parts
-
-
-def split_at_seams(surface: Surface) -> tuple[NDArray[np.int32], NDArray[np.intp], NDArray[np.float64]]:
-    """Faces (m, 3) over k vertices of one texture coordinate each, the origins of these (k,), their uv (k,
-    2)."""
-    assert surface.uv is not None
-    corners = np.column_stack([surface.faces.reshape(-1), surface.uv.reshape(-1, 2)])
-    rows, first, corner = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    source = surface.faces.reshape(-1)[first]
-    return corner.reshape(-1, 3).astype(np.int32), source.astype(np.intp), np.ascontiguousarray(rows[:, 1:])
-
-
-def srgb_to_linear(colors: ArrayLike) -> Vectors:
-    """Linear values of sRGB values 0 to 1 (IEC 61966-2-1)."""
-    value = np.clip(np.asarray(colors, np.float64), 0.0, 1.0)
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-
-
 def rotation_to_y(up: tuple[float, float, float]) -> Vectors:
-    """The smallest rotation, (3, 3), that takes the unit vector `up` to +y."""
+    """The smallest rotation (3, 3) of `up` to +y, after half a turn about x where it points down."""
     x, y, z = np.asarray(up, np.float64) / np.linalg.norm(up)
-    if y < -1 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
+    if y < 0.0:
+        return rotation_to_y((x, -y, -z)) * (1.0, -1.0, -1.0)
     # Rodrigues: v = up × y = (-z, 0, x), R = I + [v] + [v]² / (1 + y)
     cross = np.array([[0.0, -x, 0.0], [x, 0.0, z], [0.0, -z, 0.0]])
     return np.eye(3) + cross + np.einsum("ij,jk->ik", cross, cross) / (1.0 + y)
 
 
+def _center(clouds: list[Vectors]) -> Vectors:
+    """Centre of the bounding box of all points; the origin where there are none."""
+    if not clouds:
+        return np.zeros(3)
+    lowest = np.min([points.min(axis=0) for points in clouds], axis=0)
+    highest = np.max([points.max(axis=0) for points in clouds], axis=0)
+    return 0.5 * (lowest + highest)
+
+
 class _Buffer:
     """The binary chunk in the making, with its views and accessors."""
 
-    def __init__(self) -> None:
+    def __init__(self, center: Vectors, rotation: Vectors) -> None:
+        self.center = center
+        self.rotation = rotation
         self.pieces: list[bytes] = []
         self.length = 0
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add_part(self, part: Part, center: Vectors, rotation: Vectors) -> dict[str, Any]:
-        """Add a part's arrays; the primitive that refers to them."""
-        positions = np.einsum("ij,nj->ni", rotation, part.vertices - center)
-        normals = np.einsum("ij,nj->ni", rotation, part.normals)
-        missing = np.linalg.norm(normals, axis=1) < 0.5
-        normals[missing] = (0.0, 1.0, 0.0)
+    def add_sheet(self, sheet: Sheet) -> dict[str, Any]:
+        """Add a sheet's arrays; the primitive that refers to them."""
+        normals = np.einsum("ij,nj->ni", self.rotation, sheet.normals)
+        normals[np.linalg.norm(normals, axis=1) < 0.5] = (0.0, 1.0, 0.0)
+        positions = np.einsum("ij,nj->ni", self.rotation, sheet.vertices - self.center)
         attributes = {
             "POSITION": self.add(positions, "VEC3", bounds=True),
             "NORMAL": self.add(normals, "VEC3"),
         }
-        if part.colors is not None:
-            attributes["COLOR_0"] = self.add(part.colors, "VEC3")
-        if part.uv is not None:
-            attributes["TEXCOORD_0"] = self.add(
-                np.array([0.0, 1.0]) + part.uv * np.array([1.0, -1.0]), "VEC2"
-            )
-        for name, values in part.scalars.items():
+        if sheet.colors is not None:
+            attributes["COLOR_0"] = self.add(sheet.colors, "VEC3")
+        if sheet.uv is not None:
+            attributes["TEXCOORD_0"] = self.add(sheet.uv * (1.0, -1.0) + (0.0, 1.0), "VEC2")
+        for name, values in sheet.scalars.items():
             attributes[name] = self.add(values, "SCALAR")
-        return {"attributes": attributes, "indices": self.add_indices(part.faces)}
+        return {"attributes": attributes, "indices": self.add_indices(sheet.faces)}
 
     def add(self, values: NDArray[Any], kind: str, *, bounds: bool = False) -> int:
         """Add 32-bit floats, with their bounds where the format asks for them; the accessor's number."""

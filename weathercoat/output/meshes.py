@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from weathercoat.errors import UsageError
 from weathercoat.mesh.surface import Surface, face_normals
 from weathercoat.output.folder import whole_file
-from weathercoat.output.glb import surface_parts, write_glb
+from weathercoat.output.glb import write_glb
 from weathercoat.output.ply import color_bytes, write_ply
+from weathercoat.output.sheets import surface_nodes
 
 # Rows that are turned into text at a time: enough to amortise the call, little enough to stay in the cache.
 ROWS = 16384
@@ -96,7 +97,7 @@ def _write_off(stream: BinaryIO, surface: Surface) -> None:
 
 
 def _write_glb(stream: BinaryIO, surface: Surface) -> None:
-    write_glb(stream, surface_parts(surface), up=surface.up)
+    write_glb(stream, surface_nodes(surface), up=surface.up)
 
 
 def _lines(row: str, table: NDArray[Any]) -> Iterator[bytes]:

@@ -8,22 +8,30 @@ painted part is the paint, and the metal lies beneath it. Removing film never ha
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.errors import FormatError
-from weathercoat.mesh.surface import Surface, Vectors, face_areas, vertex_normals
-from weathercoat.output.glb import Material, Part, srgb_to_linear, surface_parts, write_glb
+from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas, vertex_normals
+from weathercoat.output.glb import Material, Node, Sheet, write_glb
 from weathercoat.output.ply import PlyArrays, color_bytes, read_ply_arrays, write_ply
+from weathercoat.output.sheets import METAL_CREASE, make_sheet, srgb_to_linear, surface_nodes
+from weathercoat.output.shell import make_shell
 from weathercoat.sim.snapshot import Snapshot
 
 # Depth of the metal under the film, in sizes (square root of the area): some twenty steps of a 24-bit depth
 # buffer whose near plane is a hundredth of the object away, and a third of an edge at a million faces.
 HAIR = 5e-4
+# Curls on coarse meshes turn by more between two faces than what shows an edge on metal.
+FILM_CREASE = float(np.radians(60.0))
+# Of the thickness: open edges of the front draw back, so that a closed crack shows as a groove.
+BEVEL = 0.5
 SUBSTRATE, FILM = 0, 1
 TITLE = "weathercoat snapshot 1"
 PAINT = Material("paint", metallic=0.0, roughness=0.5, double_sided=True)
+PRIMER = Material("primer", metallic=0.0, roughness=0.8, double_sided=True)
 METAL = Material("metal", metallic=0.2, roughness=0.8, double_sided=True)
 
 
@@ -98,43 +106,31 @@ def write_snapshot_glb(
     path: Path | str,
     snapshot: Snapshot,
     *,
+    thickness: float = 0.0,
+    back_color: tuple[float, float, float] | None = None,
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     untouched: Surface | None = None,
 ) -> None:
     """Write a snapshot as GLB: the nodes `film`, `substrate`, and one for each group of `untouched`.
 
-    The film is a double-sided sheet and the metal lies a hair beneath it. Colours are linear; the scalars are
-    the attributes _RUST, _DIRT, _SEPARATED, _ADHESION, _SEPARATION_AGE of the film and _RUST, _DIRT, _BARE of
-    the metal. `up` is the model's axis against gravity. Raises OSError where the file cannot be written.
+    With a thickness [units of the model] the film is a shell on the metal whose back and rim have
+    `back_color` (sRGB, 0 to 1; None: that of the front), else a double-sided sheet. The metal lies a hair
+    beneath it. Colours are linear; the scalars are the attributes _RUST, _DIRT, _SEPARATED, _ADHESION,
+    _SEPARATION_AGE of the film and _RUST, _DIRT, _BARE of the metal. `up` is the model's axis against
+    gravity. Raises OSError where the file cannot be written.
     """
-    film = Part(
-        "film",
-        PAINT,
-        snapshot.film_vertices,
-        snapshot.film_faces,
-        vertex_normals(snapshot.film_vertices, snapshot.film_faces),
-        srgb_to_linear(snapshot.film_color),
-        scalars={
-            "_RUST": snapshot.film_rust,
-            "_DIRT": snapshot.dust[snapshot.film_origin],
-            "_SEPARATED": snapshot.separated,
-            "_ADHESION": snapshot.adhesion,
-            "_SEPARATION_AGE": snapshot.separation_age,
-        },
-    )
-    substrate = Part(
-        "substrate",
+    metal = make_sheet(
         METAL,
         set_in(snapshot, hair(snapshot)),
         snapshot.substrate_faces,
-        snapshot.substrate_normals,
-        srgb_to_linear(snapshot.substrate_color),
+        crease=METAL_CREASE,
+        colors=srgb_to_linear(snapshot.substrate_color),
         scalars={"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
     )
-    others = [] if untouched is None else surface_parts(untouched)
+    others = [] if untouched is None else surface_nodes(untouched)
     write_glb(
         path,
-        [film, substrate, *others],
+        [Node("film", _film_sheets(snapshot, thickness, back_color)), Node("substrate", [metal]), *others],
         up=up,
         extras={"step": int(snapshot.step), "age": float(snapshot.age)},
     )
@@ -148,6 +144,48 @@ def hair(snapshot: Snapshot) -> float:
 def set_in(snapshot: Snapshot, depth: float) -> Vectors:
     """Positions of the metal, (n, 3), moved inwards by `depth`."""
     return snapshot.substrate_vertices - depth * snapshot.substrate_normals
+
+
+def _film_sheets(
+    snapshot: Snapshot, thickness: float, back_color: tuple[float, float, float] | None
+) -> list[Sheet]:
+    """The film's front, and where it has a thickness its back and rim."""
+    colors = srgb_to_linear(snapshot.film_color)
+    scalars = {
+        "_RUST": snapshot.film_rust,
+        "_DIRT": snapshot.dust[snapshot.film_origin],
+        "_SEPARATED": snapshot.separated,
+        "_ADHESION": snapshot.adhesion,
+        "_SEPARATION_AGE": snapshot.separation_age,
+    }
+    if thickness <= 0.0:
+        return [_used_sheet(PAINT, snapshot.film_vertices, snapshot.film_faces, colors, scalars)]
+    shell = make_shell(snapshot.film_vertices, snapshot.film_faces, thickness, bevel=BEVEL * thickness)
+    under = colors if back_color is None else np.broadcast_to(srgb_to_linear(back_color), colors.shape)
+    doubled = {name: np.tile(values, 2) for name, values in scalars.items()}
+    return [
+        _used_sheet(material, shell.vertices, faces, np.tile(shade, (2, 1)), doubled)
+        for material, faces, shade in (
+            (PAINT, shell.front, colors),
+            (PRIMER, shell.back, under),
+            (PRIMER, shell.rim, under),
+        )
+    ]
+
+
+def _used_sheet(
+    material: Material, vertices: Vectors, faces: Indices, colors: Vectors, scalars: dict[str, NDArray[Any]]
+) -> Sheet:
+    """A sheet of the vertices that its faces use."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return make_sheet(
+        material,
+        vertices[used],
+        renumbered.reshape(-1, 3).astype(np.int32),
+        crease=FILM_CREASE,
+        colors=colors[used],
+        scalars={name: values[used] for name, values in scalars.items()},
+    )
 
 
 def _floats(metal: Vectors, film: Vectors) -> NDArray[np.float32]:
