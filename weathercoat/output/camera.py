@@ -27,9 +27,23 @@ class Camera:
     tangent_x: float
     tangent_y: float
 
-    def directions(self, rows: NDArray[np.int64], width: int, height: int) -> NDArray[np.float32]:
-        """Unit directions through the centres of all pixels of some `rows` of a picture, (len(rows) * width, 3)."""
-        x = ((np.arange(width) + 0.5) / width * 2.0 - 1.0) * self.tangent_x
+    def window(self, vertices: Vectors, width: int, height: int) -> tuple[slice, slice]:
+        """The rows and columns of a picture outside which none of `vertices` shows."""
+        away = vertices - self.position
+        depth = np.maximum(away @ self.forward, 1e-9)
+        x = (away @ self.right / depth / self.tangent_x + 1.0) * 0.5 * width
+        y = (1.0 - away @ self.up / depth / self.tangent_y) * 0.5 * height
+        rows, columns = (
+            slice(int(np.clip(np.floor(at.min()), 0, limit)), int(np.clip(np.ceil(at.max()), 0, limit)))
+            for at, limit in ((y, height), (x, width))
+        )
+        return rows, columns
+
+    def directions(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64], width: int, height: int
+    ) -> NDArray[np.float32]:
+        """Unit directions through the centres of the pixels at `rows` x `columns` of a picture, (rows * columns, 3)."""
+        x = ((columns + 0.5) / width * 2.0 - 1.0) * self.tangent_x
         y = (1.0 - (rows + 0.5) / height * 2.0) * self.tangent_y
         direction = self.forward + x[None, :, None] * self.right + y[:, None, None] * self.up
         direction /= np.linalg.norm(direction, axis=2, keepdims=True)
@@ -50,7 +64,7 @@ def make_camera(
 
     An object is seen from `azimuth` and `elevation` [degrees]: azimuth 0 is its front (+z where y is up, -y where z is
     up), positive azimuths lie to its right. A plate, open or closed, is seen from its normal side, turned by the same
-    angles, so that its curls show.
+    azimuth and from a little above, so that its curls show.
     """
     upward = _unit(np.asarray(up, np.float64))
     front = _front(upward)
@@ -105,7 +119,7 @@ def _turned_from(facing: Vectors, upward: Vectors, front: Vectors, azimuth: floa
     side = np.cross(upward, level)
     a = np.radians(azimuth)
     turned = _unit(np.cos(a) * level + np.sin(a) * side)
-    e = np.radians(elevation) + 0.5 * np.arcsin(np.clip(facing @ upward, -1.0, 1.0))
+    e = np.radians(0.5 * elevation) + 0.5 * np.arcsin(np.clip(facing @ upward, -1.0, 1.0))
     return np.cos(e) * turned + np.sin(e) * upward  # type: ignore[no-any-return]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
 from weathercoat.output.shading import BACK, BARE_PART, FRONT, METAL, RIM
-from weathercoat.output.shell import Shell, corner_normals, make_shell, open_edges
+from weathercoat.output.shell import corner_normals, make_shell, open_edges, smooth_outline
 from weathercoat.sim.snapshot import Snapshot
 
 _GAP = 0.25  # of the film's thickness: the film floats this far above the metal, so that no two surfaces coincide
-_BEVEL = 0.5  # of the film's thickness
+_BEVEL = 0.4  # of the film's thickness
+_OUTLINE_PASSES = 2
 _FILM_CREASE = np.radians(60.0)  # curls on coarse meshes turn by more than a crease of the metal does
 _METAL_CREASE = np.radians(40.0)
 
@@ -87,6 +88,10 @@ class Samples:
     rust: Vectors
     layer: Vectors
 
+    def take(self, index: NDArray[np.int64]) -> Samples:
+        """Those at `index`."""
+        return Samples(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+
 
 def make_display_mesh(
     snapshot: Snapshot,
@@ -142,10 +147,11 @@ def _metal(snapshot: Snapshot, rest: Vectors, thickness: float) -> DisplayMesh:
 
 def _film(snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors) -> list[DisplayMesh]:
     """Front, back and rim of the film."""
-    shell: Shell = make_shell(
-        vertices, snapshot.film_faces, thickness, gap=_GAP * thickness, bevel=_BEVEL * thickness
-    )
     origin = snapshot.film_origin
+    fixed = np.bincount(origin, minlength=len(rest)) > 2
+    fixed[open_edges(snapshot.substrate_faces)[0]] = True
+    vertices = smooth_outline(vertices, snapshot.film_faces, fixed[origin], _OUTLINE_PASSES)
+    shell = make_shell(vertices, snapshot.film_faces, thickness, gap=_GAP * thickness, bevel=_BEVEL * thickness)
     color = np.broadcast_to(paint, (len(vertices), 3))
     scalars = {
         "rest": np.tile(rest[origin], (2, 1)),

@@ -30,7 +30,7 @@ def gather_light(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The visible share of the key light (s,) and the mean radiance of the sky over the cosine-weighted hemisphere (s, 3).
 
-    position, facet (the face's normal), normal (the shading normal): (s, 3), for samples at `row`, `column` of the picture.
+    position, facet (the face's normal), normal (the shading normal): (s, 3), for samples in the pixels at `row`, `column`.
     Sky is blocked by what lies within `reach`.
     """
     count = len(position)
@@ -113,8 +113,35 @@ def key_directions(row, column, key, index, total, out):  # type: ignore[no-unty
 
 
 @kernel
-def filter_light(sample, row, column, position, facet, tolerance, lit, sky, out_lit, out_sky):  # type: ignore[no-untyped-def]
-    """Average the light of each sample with its neighbours in the picture that lie on the same surface.
+def share_samples(sample, kind, position, facet, factor, tolerance, leader):  # type: ignore[no-untyped-def]
+    """Let the samples of a pixel that lie on one smooth surface share their light and colour.
+
+    sample int32 (height, width): the number of the sample at each place, -1 where there is none; a pixel is a square of
+    `factor` samples a side. `leader` (s,) gets the number of the sample to use in place of each.
+    """
+    height, width = sample.shape
+    for r in range(height):
+        for c in range(width):
+            i = sample[r, c]
+            if i < 0:
+                continue
+            leader[i] = i
+            for before in range((r % factor) * factor + c % factor):
+                j = sample[r - r % factor + before // factor, c - c % factor + before % factor]
+                if j < 0 or leader[j] != j or kind[j] != kind[i]:
+                    continue
+                cosine, away = 0.0, 0.0
+                for axis in range(3):
+                    cosine += facet[i, axis] * facet[j, axis]
+                    away += facet[i, axis] * (position[j, axis] - position[i, axis])
+                if cosine > 0.97 and abs(away) < tolerance:
+                    leader[i] = j
+                    break
+
+
+@kernel
+def filter_light(sample, stride, row, column, position, facet, tolerance, lit, sky, out_lit, out_sky):  # type: ignore[no-untyped-def]
+    """Average the light of each sample with its neighbours, `stride` places apart, that lie on the same surface.
 
     sample int32 (height, width): the number of the sample at each place, -1 where there is none. A neighbour counts when
     the two facets turn by less than 45 degrees and it lies within `tolerance` of the sample's plane.
@@ -123,11 +150,11 @@ def filter_light(sample, row, column, position, facet, tolerance, lit, sky, out_
     for i in range(len(row)):
         weight, light, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0
         for dy in range(-2, 3):
-            r = row[i] + dy
+            r = row[i] + dy * stride
             if r < 0 or r >= height:
                 continue
             for dx in range(-2, 3):
-                c = column[i] + dx
+                c = column[i] + dx * stride
                 if c < 0 or c >= width:
                     continue
                 j = sample[r, c]

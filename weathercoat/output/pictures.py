@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from weathercoat.errors import OutputError
 from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.camera import Camera, make_camera
-from weathercoat.output.display import Normalisation, Samples, make_display_mesh
-from weathercoat.output.lighting import filter_light, gather_light
+from weathercoat.output.display import DisplayMesh, Normalisation, Samples, make_display_mesh
+from weathercoat.output.ground import ground_shadow
+from weathercoat.output.lighting import filter_light, gather_light, share_samples
 from weathercoat.output.rays import RayQueries, make_rays
 from weathercoat.output.shading import shade, to_linear, to_srgb
 from weathercoat.sim.snapshot import Snapshot
@@ -38,13 +39,13 @@ class PictureParameters:
     paint: colour of the film's front, or None for the snapshot's own film colours, taken as they are (stains included).
     """
 
-    width: int = 560
+    width: int = 520
     height: int = 430
     azimuth: float = 32.0
     elevation: float = 24.0
     margin: float = 0.06
     samples: int = 2
-    sky_rays: int = 2
+    sky_rays: int = 3
     key_rays: int = 1
     reach: float = 0.6
     film_thickness: float = 0.0035
@@ -52,8 +53,8 @@ class PictureParameters:
     background: Color = (0.845, 0.845, 0.835)
     paint: Color | None = (0.16, 0.53, 0.60)
     primer: Color = (0.83, 0.79, 0.70)
-    metal: Color = (0.46, 0.47, 0.49)
-    rust_rim: Color = (0.76, 0.42, 0.16)
+    metal: Color = (0.47, 0.49, 0.51)
+    rust_rim: Color = (0.68, 0.40, 0.19)
     rust_body: Color = (0.52, 0.20, 0.05)
     rust_core: Color = (0.20, 0.10, 0.06)
     stain: Color = (0.50, 0.25, 0.09)
@@ -62,6 +63,7 @@ class PictureParameters:
 
 
 _KEY = 2.75 * np.array([1.0, 0.95, 0.87])
+_SAME_SURFACE = 0.004  # distance from a plane, in sizes, within which samples count as one surface
 _STAIN_ABSORPTION = np.array([0.35, 1.1, 2.2])  # optical depth of a full stain in red, green and blue
 
 
@@ -94,9 +96,10 @@ def render_snapshot(
     """
     camera = camera or frame_camera(snapshot, parameters, up=up)
     painted = parameters.paint is not None
+    normalise = Normalisation.of(snapshot)
     mesh = make_display_mesh(
         snapshot,
-        Normalisation.of(snapshot),
+        normalise,
         film_thickness=parameters.film_thickness,
         metal_thickness=parameters.metal_thickness,
         paint=to_linear(parameters.paint if painted else snapshot.film_color),
@@ -105,31 +108,45 @@ def render_snapshot(
     rays = make_rays(mesh.vertices, mesh.faces)
     factor = parameters.samples
     width, height = parameters.width * factor, parameters.height * factor
-    face, weights = _first_hits(rays, camera, width, height)
+    face, weights = _first_hits(rays, mesh, camera, width, height)
     seen = np.flatnonzero(face >= 0)
     samples = mesh.at(face[seen], weights[seen])
     if not painted:
         samples.stain[:] = 0.0
-    color = _shaded(rays, samples, seen, camera, np.asarray(up, np.float64), parameters, width, height)
-    picture = np.empty((height * width, 3), np.float32)
-    picture[:] = to_linear(parameters.background)
+    upward = np.asarray(up, np.float64)
+    key = key_direction(camera, upward)
+    color = _shaded(rays, samples, seen, camera, upward, key, parameters, width, height)
+    picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
-    blocks = picture.reshape(parameters.height, factor, parameters.width, factor, 3)
-    return to_srgb(blocks.mean(axis=(1, 3)))
+    blocks = (parameters.height, factor, parameters.width, factor)
+    coverage = (face >= 0).reshape(blocks).mean(axis=(1, 3))
+    placed = normalise(snapshot.substrate_vertices)
+    shadow = ground_shadow(
+        rays, camera, coverage < 1.0, up=upward, level=float((placed @ upward).min()) - parameters.metal_thickness,
+        radius=1.6 * float(np.linalg.norm(placed, axis=1).max()), key=key, reach=parameters.reach,
+    )  # fmt: skip
+    background = ((1.0 - coverage) * shadow)[:, :, None] * to_linear(parameters.background)
+    return to_srgb(picture.reshape(*blocks, 3).mean(axis=(1, 3)) + background)
 
 
-def _first_hits(rays: RayQueries, camera: Camera, width: int, height: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def _first_hits(
+    rays: RayQueries, mesh: DisplayMesh, camera: Camera, width: int, height: int
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """The face that each sample of the picture shows, and where on it; a band of rows at a time, to bound the memory."""
-    face = np.empty(width * height, np.int32)
-    weights = np.empty((width * height, 2), np.float32)
-    band = max(1, 500_000 // width)
-    for first in range(0, height, band):
-        rows = np.arange(first, min(first + band, height))
-        directions = camera.directions(rows, width, height)
-        origins = np.broadcast_to(camera.position.astype(np.float32), directions.shape)
-        part = slice(first * width, first * width + len(directions))
-        face[part], weights[part] = rays.nearest(np.ascontiguousarray(origins), directions)
-    return face, weights
+    face = np.full((height, width), -1, np.int32)
+    weights = np.empty((height, width, 2), np.float32)
+    rows, columns = camera.window(mesh.vertices, width, height)
+    across = np.arange(columns.start, columns.stop)
+    band = max(1, 500_000 // max(1, len(across)))
+    for first in range(rows.start, rows.stop, band):
+        down = np.arange(first, min(first + band, rows.stop))
+        directions = camera.directions(down, across, width, height)
+        origins = np.tile(camera.position.astype(np.float32), (len(directions), 1))
+        hit, where = rays.nearest(origins, directions)
+        part = (slice(first, first + len(down)), columns)
+        face[part] = hit.reshape(len(down), -1)
+        weights[part] = where.reshape(len(down), -1, 2)
+    return face.ravel(), weights.reshape(-1, 2)
 
 
 def _shaded(
@@ -138,27 +155,33 @@ def _shaded(
     seen: NDArray[np.int64],
     camera: Camera,
     up: Vectors,
+    key: Vectors,
     parameters: PictureParameters,
     width: int,
     height: int,
 ) -> NDArray[np.float32]:
     """Tone-mapped linear colours of the samples, (s, 3), at the places `seen` of the picture."""
-    row, column = (seen // width).astype(np.int32), (seen % width).astype(np.int32)
-    key = key_direction(camera, up)
+    factor = parameters.samples
+    number = np.full((height, width), -1, np.int32)
+    number.ravel()[seen] = np.arange(len(seen), dtype=np.int32)
+    leader = np.empty(len(seen), np.int32)
+    share_samples(number, samples.kind, samples.position, samples.facet, factor, _SAME_SURFACE, leader)
+    leaders, follows = np.unique(leader, return_inverse=True)
+    number.ravel()[seen] = follows
+    s = samples.take(leaders)
+    row, column = (seen[leaders] // width).astype(np.int32), (seen[leaders] % width).astype(np.int32)
     lit, sky = gather_light(
-        rays, row, column, samples.position, samples.facet, samples.normal,
+        rays, row // factor, column // factor, s.position, s.facet, s.normal,
         key=key, up=up, sky_rays=parameters.sky_rays, key_rays=parameters.key_rays, reach=parameters.reach,
     )  # fmt: skip
-    number = np.full((height, width), -1, np.int32)
-    number[row, column] = np.arange(len(seen), dtype=np.int32)
     smooth_lit, smooth_sky = np.empty_like(lit), np.empty_like(sky)
-    filter_light(number, row, column, samples.position, samples.facet, 0.004, lit, sky, smooth_lit, smooth_sky)
-    color = np.empty((len(seen), 3), np.float32)
+    filter_light(number, factor, row, column, s.position, s.facet, _SAME_SURFACE, lit, sky, smooth_lit, smooth_sky)
+    color = np.empty((len(leaders), 3), np.float32)
     shade(
-        samples.kind, samples.position, samples.normal, samples.rest, samples.stain, samples.dust, samples.rust,
-        samples.layer, samples.color, camera.position, key, _KEY, up, _palette(parameters), smooth_lit, smooth_sky, color,
+        s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, camera.position,
+        key, _KEY, up, _palette(parameters), smooth_lit, smooth_sky, color,
     )  # fmt: skip
-    return color
+    return color[follows]
 
 
 def key_direction(camera: Camera, up: Vectors) -> Vectors:

@@ -28,20 +28,22 @@ def to_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 @kernel
-def _lattice(i, j, k):  # type: ignore[no-untyped-def]
-    """A fixed value in [0, 1) at an integer lattice point (murmur3's finaliser)."""
+def _hash(i, j, k):  # type: ignore[no-untyped-def]
+    """32 fixed bits for an integer lattice point (murmur3's finaliser)."""
     h = (np.uint32(i) * np.uint32(0x8DA6B343)) ^ (np.uint32(j) * np.uint32(0xD8163841)) ^ (np.uint32(k) * np.uint32(0xCB1AB31F))
     h = np.uint32(h ^ (h >> np.uint32(16)))
     h = np.uint32(h * np.uint32(0x85EBCA6B))
     h = np.uint32(h ^ (h >> np.uint32(13)))
     h = np.uint32(h * np.uint32(0xC2B2AE35))
-    h = np.uint32(h ^ (h >> np.uint32(16)))
-    return np.float64(h) * 2.3283064365386963e-10
+    return np.uint32(h ^ (h >> np.uint32(16)))
 
 
 @kernel
-def value_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
-    """Smooth noise in [0, 1] with one value per unit cell, interpolated by quintics; its gradient goes to `slope` (3,)."""
+def gradient_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
+    """Gradient noise in about [0, 1] with one random gradient per unit cell corner; its own gradient goes to `slope` (3,).
+
+    Bumps need the gradient, so this is not the noise of the film. Source of the method: Perlin, Improving noise, 2002.
+    """
     fx, fy, fz = np.floor(x), np.floor(y), np.floor(z)
     i, j, k = np.int64(fx), np.int64(fy), np.int64(fz)
     u, v, w = x - fx, y - fy, z - fz
@@ -51,17 +53,23 @@ def value_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
     du = 30.0 * u * u * (u * (u - 2.0) + 1.0)
     dv = 30.0 * v * v * (v * (v - 2.0) + 1.0)
     dw = 30.0 * w * w * (w * (w - 2.0) + 1.0)
-    a, b = _lattice(i, j, k), _lattice(i + 1, j, k)
-    c, d = _lattice(i, j + 1, k), _lattice(i + 1, j + 1, k)
-    e, f = _lattice(i, j, k + 1), _lattice(i + 1, j, k + 1)
-    g, h = _lattice(i, j + 1, k + 1), _lattice(i + 1, j + 1, k + 1)
-    k0, k1, k2, k3 = a, b - a, c - a, e - a
-    k4, k5, k6 = a - b - c + d, a - c - e + g, a - b - e + f
-    k7 = -a + b + c - d + e - f - g + h
-    slope[0] = du * (k1 + k4 * sv + k6 * sw + k7 * sv * sw)
-    slope[1] = dv * (k2 + k4 * su + k5 * sw + k7 * su * sw)
-    slope[2] = dw * (k3 + k5 * sv + k6 * su + k7 * su * sv)
-    return k0 + k1 * su + k2 * sv + k3 * sw + k4 * su * sv + k5 * sv * sw + k6 * su * sw + k7 * su * sv * sw
+    value, gx, gy, gz = 0.0, 0.0, 0.0, 0.0
+    for corner in range(8):
+        a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+        bits = _hash(i + a, j + b, k + c)
+        px = np.float64(bits & np.uint32(1023)) * (2.0 / 1023.0) - 1.0
+        py = np.float64((bits >> np.uint32(10)) & np.uint32(1023)) * (2.0 / 1023.0) - 1.0
+        pz = np.float64((bits >> np.uint32(20)) & np.uint32(1023)) * (2.0 / 1023.0) - 1.0
+        wx, dx = (su, du) if a else (1.0 - su, -du)
+        wy, dy = (sv, dv) if b else (1.0 - sv, -dv)
+        wz, dz = (sw, dw) if c else (1.0 - sw, -dw)
+        rise = px * (u - a) + py * (v - b) + pz * (w - c)
+        value += wx * wy * wz * rise
+        gx += wx * wy * wz * px + dx * wy * wz * rise
+        gy += wx * wy * wz * py + wx * dy * wz * rise
+        gz += wx * wy * wz * pz + wx * wy * dz * rise
+    slope[0], slope[1], slope[2] = 0.9 * gx, 0.9 * gy, 0.9 * gz
+    return 0.5 + 0.9 * value
 
 
 @kernel
@@ -71,7 +79,7 @@ def fractal_noise(x, y, z, frequency, octaves, slope, scratch):  # type: ignore[
     slope[0] = slope[1] = slope[2] = 0.0
     for octave in range(octaves):
         shift = 17.31 * octave
-        total += height * value_noise(x * f + shift, y * f + 1.7 * shift, z * f + 2.3 * shift, scratch)
+        total += height * gradient_noise(x * f + shift, y * f + 1.7 * shift, z * f + 2.3 * shift, scratch)
         for axis in range(3):
             slope[axis] += height * f * scratch[axis]
         weight += height
@@ -104,25 +112,30 @@ def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ig
     if amount <= 0.004:
         return 0.0
     x, y, z = rest[0], rest[1], rest[2]
-    patch = fractal_noise(x, y, z, 9.0, 5, slope, scratch)
-    level = 1.55 * amount - 1.7 * (patch - 0.2)
-    cover = _smooth_step(-0.06, 0.14, level)
+    patch = fractal_noise(x, y, z, 9.0, 4, slope, scratch)
+    grain = fractal_noise(x, y, z, 64.0, 4, slope, scratch)
+    level = 1.5 * amount - 1.6 * (patch - 0.2) + 0.5 * (grain - 0.5) * (1.0 - 0.5 * amount)
+    # Ahead of the rust proper the steel is tarnished.
+    _blend(albedo, colors[2], 0.45 * _smooth_step(-0.4, 0.05, level))
+    cover = _smooth_step(-0.05, 0.12, level)
     if cover <= 0.0:
         return 0.0
-    grain = fractal_noise(x, y, z, 70.0, 3, slope, scratch)
-    mottle = 0.6 * patch + 0.4 * grain
-    age = min(1.0, max(0.0, level * 1.15 + 1.3 * (0.5 - mottle)))
-    body = _smooth_step(0.1, 0.5, age)
-    core = _smooth_step(0.55, 1.15, age)
-    pit = _smooth_step(0.6, 0.74, grain) * _smooth_step(0.15, 0.6, level)
-    shade = 0.72 + 0.56 * grain
+    region = gradient_noise(x * 4.3 + 5.0, y * 4.3, z * 4.3, scratch)
+    mottle = 0.45 * patch + 0.55 * grain
+    age = level + 2.4 * (0.5 - mottle) + 0.5 * (region - 0.5)
+    body = _smooth_step(0.0, 0.4, age)
+    core = 0.9 * _smooth_step(0.35, 1.35, age)
+    powder = 0.55 * _smooth_step(0.54, 0.7, mottle) * _smooth_step(0.3, 0.7, region)
+    pit = _smooth_step(0.6, 0.7, grain) * _smooth_step(0.2, 0.6, level)
+    shade = 0.6 + 0.8 * grain
     for c in range(3):
         rust = colors[0, c] + body * (colors[1, c] - colors[0, c])
         rust += core * (colors[2, c] - rust)
-        rust *= shade * (1.0 - 0.65 * pit)
+        rust += powder * (colors[0, c] - rust)
+        rust *= shade * (1.0 - 0.7 * pit)
         albedo[c] += cover * (rust - albedo[c])
     for axis in range(3):
-        bump[axis] += cover * 0.0075 * slope[axis]
+        bump[axis] += cover * 0.009 * slope[axis]
     return cover
 
 
@@ -130,10 +143,10 @@ def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ig
 def _film_color(rest, up, stain, dust, palette, albedo, bump, slope, scratch):  # type: ignore[no-untyped-def]
     """Paint with runoff rust and dust over it, to `albedo`; returns its roughness and its gloss (0 to 1)."""
     x, y, z = rest[0], rest[1], rest[2]
-    cloud = fractal_noise(x, y, z, 5.0, 3, slope, scratch)
+    cloud = fractal_noise(x, y, z, 6.0, 5, slope, scratch)
     for c in range(3):
-        albedo[c] *= 0.9 + 0.2 * cloud
-    value_noise(x * 95.0, y * 95.0, z * 95.0, slope)
+        albedo[c] *= 0.84 + 0.32 * cloud
+    gradient_noise(x * 95.0, y * 95.0, z * 95.0, slope)
     for axis in range(3):
         bump[axis] += 0.028 * slope[axis]
     roughness, gloss = 0.34 + 0.18 * cloud, 1.0
@@ -144,11 +157,11 @@ def _film_color(rest, up, stain, dust, palette, albedo, bump, slope, scratch):  
         streak = fractal_noise(
             42.0 * sx + 4.0 * fall * up[0], 42.0 * sy + 4.0 * fall * up[1], 42.0 * sz + 4.0 * fall * up[2], 1.0, 3, slope, scratch
         )
-        cover = _smooth_step(0.0, 1.0, stain * (0.55 + 1.3 * (streak - 0.2)))
+        cover = _smooth_step(0.0, 0.9, stain * (0.3 + 2.0 * max(0.0, streak - 0.15)))
         for c in range(3):
             # A thin stain filters the paint's light, a thick one covers it.
             albedo[c] *= np.exp(-cover * palette[6, c])
-        _blend(albedo, palette[5], 0.75 * cover * cover)
+        _blend(albedo, palette[5], 0.85 * cover**1.3)
         roughness += 0.35 * cover
         gloss *= 1.0 - 0.7 * cover
     if dust > 0.01:
@@ -219,10 +232,14 @@ def shade(kind, position, normal, rest, stain, dust, rust, layer, color, eye, ke
             value = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 30.0, 3, slope, scratch)
             for c in range(3):
                 albedo[c] *= 0.82 + 0.3 * value
-            roughness, gloss = 0.8, 0.5
-            if k == BACK:
-                cover = _rust_layer(rest[i], 0.55 * rust[i], palette[2:5], albedo, bump, slope, scratch)
-                gloss *= 1.0 - cover
+            if k == RIM:
+                # A broken edge is fresh in places and holds grime in others.
+                _blend(albedo, palette[7], 0.75 * _smooth_step(0.38, 0.6, value))
+                for c in range(3):
+                    albedo[c] *= 0.8
+            # Rust of the metal clings to the back of the film and bleeds out under its edge.
+            cover = _rust_layer(rest[i], 0.6 * rust[i], palette[2:5], albedo, bump, slope, scratch)
+            roughness, gloss = 0.8, 0.5 * (1.0 - cover)
         elif k == METAL:
             albedo[:] = palette[1]
             scale = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 14.0, 4, slope, scratch)

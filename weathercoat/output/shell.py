@@ -57,6 +57,32 @@ def open_edges(faces: Indices) -> tuple[Indices, Indices, Indices]:
     return tails[is_open].astype(np.int32), heads[is_open].astype(np.int32), owners[is_open]
 
 
+def smooth_outline(
+    vertices: Vectors, faces: Indices, fixed: NDArray[np.bool_], passes: int, *, sharpest: float = 0.3
+) -> Vectors:
+    """The vertices (n, 3) with the open edges of the sheet smoothed within its surface, except where `fixed` (n,).
+
+    A crack that runs along the edges of random triangles zigzags. Each pass draws a vertex half way to the middle of its
+    two neighbours along the outline and then a little more than half way back, which takes away the zigzag and keeps the
+    form (Taubin, A signal processing approach to fair surface design, 1995). A vertex stays where that would leave the
+    surface: where more than `sharpest` of the way leads along the normal, as across a crease.
+    """
+    tails, heads, _ = open_edges(faces)
+    ends = np.bincount(tails, minlength=len(vertices)) + np.bincount(heads, minlength=len(vertices))
+    free = (ends == 2) & ~fixed
+    normals = vertex_normals(vertices, faces)
+    for factor in (0.5, -0.53) * passes:
+        total = np.zeros_like(vertices)
+        for axis in range(3):
+            total[:, axis] = np.bincount(heads, vertices[tails, axis], len(vertices))
+            total[:, axis] += np.bincount(tails, vertices[heads, axis], len(vertices))
+        way = np.where(free[:, None], factor * (0.5 * total - vertices), 0.0)
+        along = np.einsum("ij,ij->i", way, normals)
+        way[np.abs(along) > sharpest * np.linalg.norm(way, axis=1)] = 0.0
+        vertices = vertices + way - np.einsum("ij,ij->i", way, normals)[:, None] * normals
+    return vertices
+
+
 def _inward(
     vertices: Vectors, faces: Indices, tails: Indices, heads: Indices, owners: Indices, length: float
 ) -> Vectors:
