@@ -1,6 +1,6 @@
 """YAML with line numbers, read as version 1.2 means it.
 
-PyYAML follows YAML 1.1, where `off` is a boolean, `1e-3` is text and `1:30` is ninety. Here only true and false
+PyYAML follows YAML 1.1: `off` is a boolean, `1e-3` is text and `1:30` is ninety. Here only true and false
 are booleans, and every usual spelling of a number is a number. Nothing is executed; neither nesting nor
 aliases can make a small file large.
 """

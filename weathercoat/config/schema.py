@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -328,13 +328,10 @@ class Appearance(Section):
 class Snapshots(Section):
     """When film and metal are recorded: a number of times, or explicit steps."""
 
-    count: Whole | None = parameter(
-        5,
-        "Number of snapshots, evenly spaced over the run and ending with it; not together with steps",
-        ge=1,
-        le=100_000,
+    count: Annotated[int, Field(ge=1, le=100_000), BeforeValidator(_refuse_text_and_bool)] | None = parameter(
+        5, "Number of snapshots, evenly spaced over the run and ending with it; not together with steps"
     )
-    steps: tuple[Annotated[Whole, Field(ge=0)], ...] = parameter(
+    steps: tuple[Annotated[int, Field(ge=0), BeforeValidator(_refuse_text_and_bool)], ...] = parameter(
         (), "The steps to record instead, in rising order; 0 is the start"
     )
 
@@ -384,7 +381,10 @@ RemeshOrOff = Annotated[
 
 
 class Config(Section):
-    """One run of weathercoat. `remesh` is false where the model's own triangles are used."""
+    """What is not in a section.
+
+    `remesh` is false where the model's own triangles are used.
+    """
 
     version: Literal[1] = parameter(VERSION, "Version of this schema")
     preset: Names = parameter(
@@ -460,7 +460,7 @@ def parameters(section: type[Section] = Config, prefix: str = "") -> Iterator[Pa
             key=key,
             default=field.default,
             description=field.description or "",
-            kind=_describe_kind(field.annotation) + _describe_bounds(field),
+            kind=_describe_kind(field.annotation) + _describe_bounds(field.metadata),
             unit=str(extra.get("unit", "")),
             symbol=str(extra.get("symbol", "")),
         )
@@ -470,25 +470,24 @@ def _describe_kind(kind: Any) -> str:
     """What a parameter of the type `kind` accepts, in words."""
     origin, inner = get_origin(kind), [part for part in get_args(kind) if part is not type(None)]
     if origin is Annotated:
-        return _describe_kind(inner[0])
+        return _describe_kind(inner[0]) + _describe_bounds(inner[1:])
     if kind == get_args(Color)[0]:
         return '"#rrggbb" or [r, g, b]'
     if origin is Literal:
         return ", ".join(map(str, inner))
     if origin is tuple:
-        return (
-            f"list of {_describe_kind(inner[0])}"
-            if Ellipsis in inner
-            else f"three {_describe_kind(inner[0])}s"
-        )
+        many = "list of " if Ellipsis in inner else "three "
+        return many + _describe_kind(inner[0]).replace("number", "numbers").replace("name", "names")
     if inner:
         return " or ".join(map(_describe_kind, inner))
-    return {bool: "true, false", int: "whole number", float: "number", str: "names"}[kind]
+    return {bool: "true, false", int: "whole number", float: "number", str: "name"}[kind]
 
 
-def _describe_bounds(field: FieldInfo) -> str:
+def _describe_bounds(metadata: Iterable[Any]) -> str:
     words = ""
-    for bound in field.metadata:
+    for bound in metadata:
+        if isinstance(bound, FieldInfo):
+            words += _describe_bounds(bound.metadata)
         for kind, name, word in (
             (Gt, "gt", "above"),
             (Ge, "ge", "from"),

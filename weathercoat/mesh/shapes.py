@@ -1,7 +1,7 @@
 """Generated surfaces: simple painted parts to try the tool on, and sheets for tests and benchmarks.
 
-All are y-up and centred on the y axis, in any unit. Closed ones are watertight and oriented outwards; none has
-a degenerate face. The annotation of each argument is its help text on the command line.
+All are y-up, centred on the y axis, in any unit. Closed ones are watertight and oriented outwards; none has a
+degenerate face. The annotation of each argument is its help text on the command line.
 """
 
 from __future__ import annotations
