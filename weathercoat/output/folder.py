@@ -15,6 +15,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
 import unicodedata
@@ -29,6 +30,7 @@ from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
 LONGEST_NAME = 255
+DEVICE_NAMES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # no files on Windows
 DEVICE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO}
 
 
@@ -146,6 +148,8 @@ def safe_name(text: str, suffix: str = "") -> str:
     normal = unicodedata.normalize("NFC", text)
     kept = "".join(c if unicodedata.category(c)[0] in "LNM" or c in " -_.+" else "_" for c in normal)
     name = kept.strip(" .-") or "model"
+    if DEVICE_NAMES.fullmatch(name):
+        name = f"_{name}"
     room = LONGEST_NAME - len(suffix.encode())
     if len(name.encode()) > room:
         digest = "-" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
