@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from weathercoat.config.document import read_value
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config, Parameter, Section, parameters, section_of
 
@@ -113,6 +114,8 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if value is False or value is True or value is None:
         return json.dumps(value)
-    if isinstance(value, str) and not value.replace("_", "").isalpha():
+    if isinstance(value, str) and not (
+        value.replace("_", "").isalpha() and read_value(value, "", "") == value
+    ):
         return json.dumps(value, ensure_ascii=False)
     return str(value)

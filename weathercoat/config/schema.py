@@ -485,15 +485,11 @@ def _describe_kind(kind: Any) -> str:
 
 def _describe_bounds(metadata: Iterable[Any]) -> str:
     words = ""
+    kinds = ((Gt, "gt", "above"), (Ge, "ge", "from"), (Lt, "lt", "below"), (Le, "le", "to"))
     for bound in metadata:
         if isinstance(bound, FieldInfo):
             words += _describe_bounds(bound.metadata)
-        for kind, name, word in (
-            (Gt, "gt", "above"),
-            (Ge, "ge", "from"),
-            (Lt, "lt", "below"),
-            (Le, "le", "to"),
-        ):
+        for kind, name, word in kinds:
             if isinstance(bound, kind):
                 value = getattr(bound, name)
                 words += f" {word} " + (f"{int(value):,}" if value == int(value) else f"{value:.4g}")
