@@ -99,14 +99,14 @@ def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
     forward = origin[tail] * count + origin[head]
     backward = origin[head] * count + origin[tail]
     order = np.argsort(forward, kind="stable")
-    place = np.minimum(np.searchsorted(forward[order], backward), max(len(order) - 1, 0))
-    twin = order[place] if len(order) else order
-    has_twin = forward[twin] == backward
+    place, has_twin = _find(backward, forward[order])
+    twin = order[place]
     apart = has_twin & ((tail != head[twin]) | (head != tail[twin]))
 
     metal = snapshot.substrate_faces.astype(np.int64)
-    metal_edges = (metal * count + np.roll(metal, -1, axis=1)).ravel()
-    at_loss = ~has_twin & np.isin(backward, metal_edges)
+    metal_edges = np.sort((metal * count + np.roll(metal, -1, axis=1)).ravel())
+    at_loss = np.flatnonzero(~has_twin)
+    at_loss = at_loss[_find(backward[at_loss], metal_edges)[1]]
 
     ends = snapshot.substrate_vertices[origin[tail]], snapshot.substrate_vertices[origin[head]]
     length = np.linalg.norm(ends[1] - ends[0], axis=1)
@@ -116,13 +116,17 @@ def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
 def measure_surface(surface: Surface) -> dict[str, Any]:
     """Counts, area, diagonal and the statistics of edges and angles of a mesh."""
     faces = surface.faces.astype(np.int64)
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edges, uses = np.unique(edges, axis=0, return_counts=True)
-    length = np.linalg.norm(surface.vertices[edges[:, 1]] - surface.vertices[edges[:, 0]], axis=1)
+    ahead = np.roll(faces, -1, axis=1)
+    count = len(surface.vertices)
+    keys = np.sort((np.minimum(faces, ahead) * count + np.maximum(faces, ahead)).ravel())
+    first = np.flatnonzero(np.diff(keys, prepend=-1))
+    uses = np.diff(first, append=len(keys))
+    edges = keys[first]
+    length = np.linalg.norm(surface.vertices[edges % count] - surface.vertices[edges // count], axis=1)
     smallest = _smallest_angles(surface.vertices, surface.faces)
     return {
         "faces": len(faces),
-        "vertices": len(np.unique(faces)),
+        "vertices": int(np.count_nonzero(np.bincount(faces.ravel(), minlength=count))),
         "area": surface.area(),
         "diagonal": surface.diagonal(),
         "edges": {
@@ -249,6 +253,14 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     return value
+
+
+def _find(keys: NDArray[np.int64], table: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Place of each key in a sorted table, and whether it is there."""
+    if not len(table):
+        return np.zeros(len(keys), np.intp), np.zeros(len(keys), np.bool_)
+    place = np.minimum(np.searchsorted(table, keys), len(table) - 1)
+    return place, table[place] == keys
 
 
 def _mean(values: Vectors, faces: Indices, areas: Vectors) -> float:
