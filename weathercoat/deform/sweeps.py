@@ -28,7 +28,7 @@ _LARGEST_BEND = 0.9 * math.pi  # a target beyond this would fold a hinge through
 class DeformParameters:
     """How separated film curls. Lengths in sizes, rates per unit of age, angles in radians.
 
-    The names are those of the config's sections; the first value named of a string field is the default.
+    The names are those of the config's sections: `curl_radius` is `curl.radius`. The string fields choose between forms.
     """
 
     curl_rule: str = "curvature"  # or "angle"
@@ -36,9 +36,9 @@ class DeformParameters:
     curl_rate: float = 4.0
     curl_angle_rate: float = 0.8
     curl_angle_floor: float = 2.6
-    sweeps: int = 10
-    angle: str = "dihedral"  # or "split", "arccos"
-    angle_stiffness: float = 1.0
+    deformation_sweeps: int = 10
+    deformation_angle: str = "dihedral"  # or "split", "arccos"
+    deformation_angle_stiffness: float = 1.0
 
 
 @dataclass
@@ -209,14 +209,14 @@ def deform(mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParam
     if len(constraints.free_vertices) == 0:
         return
     target = bend_targets(constraints, parameters, age)
-    if parameters.angle == "dihedral":
+    if parameters.deformation_angle == "dihedral":
         target = np.tan(0.5 * target)
-    for _ in range(parameters.sweeps):
+    for _ in range(parameters.deformation_sweeps):
         project_lengths(
             mesh.positions, constraints.inverse_mass, constraints.length_ends, constraints.length_targets
         )
-        _PROJECT_ANGLES[parameters.angle](
-            mesh.positions, constraints.inverse_mass, constraints.hinges, target, parameters.angle_stiffness
+        _PROJECT_ANGLES[parameters.deformation_angle](
+            mesh.positions, constraints.inverse_mass, constraints.hinges, target, parameters.deformation_angle_stiffness
         )
         lift_to_substrate(
             mesh.positions, mesh.origin, mesh.rest_positions, mesh.rest_normals, constraints.free_vertices
