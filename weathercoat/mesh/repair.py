@@ -22,6 +22,7 @@ from weathercoat.errors import (
 from weathercoat.mesh import topology
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.surface import Surface
+from weathercoat.mesh.topology import cross, dot
 from weathercoat.mesh.triangulate import triangulate
 
 Points = NDArray[np.float64]
@@ -36,6 +37,10 @@ MIN_RESOLUTION = 1e-3
 MIN_DIAGONAL, MAX_DIAGONAL = 1e-13, 1e13
 # Height of a triangle over its longest edge below which it has no area: the rounding of float32 positions.
 MIN_HEIGHT = SINGLE
+# Shortest over longest edge below which a flat face is closed rather than flipped.
+MAX_NEEDLE_RATIO = 1e-6
+# Rounds of closing and flipping; each leaves far fewer flat faces, and what is left after them is dropped.
+MAX_ROUNDS = 8
 # A model is called soup where more than this share of its faces has no neighbour.
 SOUP_SHARE = 0.5
 MIN_SOUP_FACES = 10
@@ -51,7 +56,9 @@ def repair(
     notes = list(polygons.notes)
     if not len(polygons.sizes):
         raise NoFacesError(
-            "all faces have illegal indices" if notes and notes[-1].code == "W-BADINDEX" else "the model has no faces"
+            "all faces have illegal indices"
+            if notes and notes[-1].code == "W-BADINDEX"
+            else "the model has no faces"
         )
     triangle_count = int(np.maximum(polygons.sizes - 2, 0).sum())
     if triangle_count > max_faces:
@@ -66,7 +73,7 @@ def repair(
     many = int((polygons.sizes > 3).sum())
     if many:
         notes.append(Note("W-POLYGONS", many, f"polygons were cut into {triangle_count} triangles in all"))
-    vertex, kept_vertices, welded = weld(polygons.positions, polygons.corners, polygons.single_precision)
+    vertex, kept_vertices, welded = weld(polygons.positions, polygons.corners, polygons.part)
     if welded and polygons.shared:
         notes.append(Note("W-WELDED", welded, "vertices at the position of another were merged with it"))
     if not polygons.shared:
@@ -76,8 +83,10 @@ def repair(
         notes.append(Note("W-UNREFERENCED", unreferenced, "vertices that no face uses were dropped"))
     vertices = polygons.positions[kept_vertices]
     faces = vertex[triangles].astype(np.int32)
-    uv = None if polygons.uv is None else polygons.uv[triangles]
-    face_group = np.zeros(len(faces), np.int32) if polygons.face_group is None else polygons.face_group[polygon]
+    uv = np.zeros((len(faces), 3, 2)) if polygons.uv is None else polygons.uv[triangles]
+    face_group = (
+        np.zeros(len(faces), np.int32) if polygons.face_group is None else polygons.face_group[polygon]
+    )
 
     faces, uv, source, degenerate = remove_degenerate(vertices, faces, uv)
     if degenerate + too_small:
@@ -87,12 +96,11 @@ def repair(
     keep = first_of_duplicates(faces)
     if not keep.all():
         notes.append(Note("W-DUPLICATE", int((~keep).sum()), "faces on the vertices of another were dropped"))
-        faces, source, uv = faces[keep], source[keep], None if uv is None else uv[keep]
+        faces, source, uv = faces[keep], source[keep], uv[keep]
 
     faces, flipped, parent, more = make_oriented_manifold(vertices, faces)
     notes += more
-    if uv is not None:
-        uv[flipped] = uv[flipped][:, [0, 2, 1]]
+    uv[flipped] = uv[flipped][:, [0, 2, 1]]
     used, compact = np.unique(faces, return_inverse=True)
     origin = kept_vertices[parent[used]]
     return Surface(
@@ -100,7 +108,7 @@ def repair(
         faces=compact.reshape(-1, 3).astype(np.int32),
         face_group=face_group[source].astype(np.int32),
         groups=polygons.groups,
-        uv=uv,
+        uv=None if polygons.uv is None else uv,
         colors=None if polygons.colors is None else np.ascontiguousarray(polygons.colors[origin]),
         up=up,
         notes=tuple(notes),
@@ -131,13 +139,13 @@ def check_precision(points: Points, single_precision: bool) -> None:
         )
 
 
-def weld(positions: Points, corners: Indices, single_precision: bool) -> tuple[Indices, Indices, int]:
-    """Merge the vertices in use that lie at the same position, up to the rounding of float32.
+def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tuple[Indices, Indices, int]:
+    """Merge the vertices in use of one `part` (n,) that lie at the same position, up to the rounding of one float32 operation per coordinate.
 
-    The tolerance is a box, per axis: the spacing of float32 relative to the model's extent on that axis, since most programs
-    compute in float32 whatever they write; and where the file itself stores float32, its spacing at the largest coordinate.
-    An absolute tolerance, or one for all axes, would collapse tiny, flat or very long models; and no shape can be told
-    apart below this one.
+    The tolerance is relative, so that no scale, proportion or offset changes what is merged: two coordinates are the same
+    where they differ by 2^-23 of their own magnitude, since most programs round to float32 whatever they write afterwards;
+    on an axis on which the model lies far from the origin, 2^-23 of its extent there instead. It never exceeds a
+    ten-millionth of the model, far below the thickness of any sheet.
 
     Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file there; and how
     many vertices were merged away.
@@ -145,12 +153,16 @@ def weld(positions: Points, corners: Indices, single_precision: bool) -> tuple[I
     used, compact = np.unique(corners, return_inverse=True)
     points = np.ascontiguousarray(positions[used])
     low, high = points.min(axis=0), points.max(axis=0)
-    tolerance = SINGLE * (high - low)
-    if single_precision:
-        tolerance = np.maximum(tolerance, SINGLE * np.maximum(np.abs(low), np.abs(high)))
-    cell = np.where(tolerance > 0, 4.0 * tolerance, 1.0)
+    extent = high - low
+    is_far = np.maximum(np.abs(low), np.abs(high)) > 2.0 * extent
+    tolerance = SINGLE * np.where(is_far, extent, np.abs(points))
+    # A lattice on which points within the tolerance are at most two steps apart: of the leading bits, or even.
+    bits = np.abs(points).view(np.int64) >> (52 - 23)
+    even = (points - low) / np.where(extent > 0, SINGLE * extent, 1.0)
+    lattice = np.where(is_far, even.astype(np.int64), np.where(points < 0, -bits, bits))
     first = np.empty(len(points), np.int64)
-    _merge_near(points, low, cell, tolerance, first)
+    within = np.zeros(len(points), np.int64) if part is None else part[used]
+    _merge_near(points, within, lattice, tolerance, first)
     kept = np.flatnonzero(first == np.arange(len(first)))
     number = np.empty(len(points), np.int64)
     number[kept] = np.arange(len(kept))
@@ -158,31 +170,62 @@ def weld(positions: Points, corners: Indices, single_precision: bool) -> tuple[I
 
 
 def remove_degenerate(
-    vertices: Points, faces: Faces, uv: NDArray[np.float64] | None
-) -> tuple[Faces, NDArray[np.float64] | None, Indices, int]:
+    vertices: Points, faces: Faces, uv: NDArray[np.float64]
+) -> tuple[Faces, NDArray[np.float64], Indices, int]:
     """Remove the faces without area, and leave no crack where they were.
 
-    A face with a repeated vertex is dropped. One whose corners lie on a line is flipped away with the neighbour across its
-    longest edge, which thereby takes in the middle corner; at a boundary it is dropped.
+    A face with a repeated vertex is dropped. A needle, two of whose corners all but coincide, is closed by merging them. A cap,
+    one of whose corners lies on the opposite edge, is flipped away with the neighbour across that edge, which so takes in
+    the corner; at a boundary it is dropped.
     Returns faces, uv, for each face the one whose attributes it has, and how many had no area.
     """
-    repeated = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    source = np.flatnonzero(~repeated)
-    faces = faces[source]
-    flat = is_flat(vertices, faces)
-    degenerate = int(repeated.sum() + flat.sum())
-    uv = None if uv is None else uv[source]
-    if flat.all():
-        return faces[:0], uv, source[:0], degenerate
-    if flat.any():
-        twin, _ = topology.match_twins(vertices, faces)
-        work_uv = np.zeros((len(faces), 3, 2)) if uv is None else uv
-        taken_from = np.arange(len(faces))
-        _flip_flat(vertices, faces, twin, work_uv, taken_from, np.flatnonzero(flat))
-        keep = ~is_flat(vertices, faces) & ~(faces == np.roll(faces, 1, axis=1)).any(axis=1)
-        faces, source = faces[keep], source[taken_from[keep]]
-        uv = None if uv is None else work_uv[keep]
+    source = np.arange(len(faces))
+    uv = uv.copy()
+    degenerate = int((_has_repeats(faces) | is_flat(vertices, faces)).sum())
+    if not degenerate:
+        return faces, uv, source, 0
+    for _ in range(MAX_ROUNDS):
+        faces, uv, source = _select(~_has_repeats(faces), faces, uv, source)
+        flat = np.flatnonzero(is_flat(vertices, faces))
+        if not len(flat):
+            break
+        needles = flat[_edge_ratio(vertices, faces[flat]) <= MAX_NEEDLE_RATIO]
+        if len(needles):
+            faces = _merge_shortest(vertices, faces, needles)
+        else:
+            twin, _ = topology.match_twins(vertices, faces)
+            _flip_flat(vertices, faces, twin, uv, source, flat)
+    faces, uv, source = _select(~(_has_repeats(faces) | is_flat(vertices, faces)), faces, uv, source)
     return faces, uv, source, degenerate
+
+
+def _select(
+    keep: NDArray[np.bool_], faces: Faces, uv: NDArray[np.float64], source: Indices
+) -> tuple[Faces, NDArray[np.float64], Indices]:
+    return faces[keep], uv[keep], source[keep]
+
+
+def _has_repeats(faces: Faces) -> NDArray[np.bool_]:
+    return (faces == np.roll(faces, 1, axis=1)).any(axis=1)  # type: ignore[no-any-return]
+
+
+def _edge_lengths(vertices: Points, faces: Faces) -> Points:
+    """Length of the edge that follows each corner, (m, 3)."""
+    corner = vertices[faces]
+    return np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)  # type: ignore[no-any-return]
+
+
+def _edge_ratio(vertices: Points, faces: Faces) -> Points:
+    """Shortest edge of each face over its longest."""
+    length = _edge_lengths(vertices, faces)
+    return length.min(axis=1) / length.max(axis=1)  # type: ignore[no-any-return]
+
+
+def _merge_shortest(vertices: Points, faces: Faces, needles: Indices) -> Faces:
+    """Faces with the two ends of the shortest edge of each of `needles` made one vertex, the first of them."""
+    side = np.argmin(_edge_lengths(vertices, faces[needles]), axis=1)
+    ends = np.stack([faces[needles, side], faces[needles, (side + 1) % 3]]).astype(np.int64)
+    return topology.merged(len(vertices), ends)[faces].astype(np.int32)
 
 
 def is_flat(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
@@ -265,10 +308,10 @@ def _drop_nonfinite(polygons: Polygons) -> list[Note]:
 
 
 @kernel
-def _merge_near(points, low, cell, tolerance, first):  # type: ignore[no-untyped-def]
-    """`first` (n,) becomes the first point of those kept that lies within the box `tolerance` of each point, or itself.
+def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-untyped-def]
+    """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each point, or the point itself.
 
-    A grid of cells in a hash table; only kept points are entered, so that no cell holds more than a few.
+    Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell holds more than a few.
     """
     n = len(points)
     size = 16
@@ -277,40 +320,30 @@ def _merge_near(points, low, cell, tolerance, first):  # type: ignore[no-untyped
     head = np.full(size, -1, np.int64)
     behind = np.full(n, -1, np.int64)
     for i in range(n):
-        p = points[i]
-        begin0 = np.int64((p[0] - tolerance[0] - low[0]) // cell[0])
-        begin1 = np.int64((p[1] - tolerance[1] - low[1]) // cell[1])
-        begin2 = np.int64((p[2] - tolerance[2] - low[2]) // cell[2])
-        end0 = np.int64((p[0] + tolerance[0] - low[0]) // cell[0])
-        end1 = np.int64((p[1] + tolerance[1] - low[1]) // cell[1])
-        end2 = np.int64((p[2] + tolerance[2] - low[2]) // cell[2])
+        x, y, z = lattice[i]
         first[i] = i
-        for a in range(begin0, end0 + 1):
-            for b in range(begin1, end1 + 1):
-                for c in range(begin2, end2 + 1):
-                    j = head[_slot(a, b, c, size)]
+        for a in range((x - 2) >> 2, ((x + 2) >> 2) + 1):
+            for b in range((y - 2) >> 2, ((y + 2) >> 2) + 1):
+                for c in range((z - 2) >> 2, ((z + 2) >> 2) + 1):
+                    j = head[_slot(part[i], a, b, c, size)]
                     while j >= 0:
-                        near = True
+                        near = part[j] == part[i]
                         for k in range(3):
-                            near = near and abs(points[j, k] - p[k]) <= tolerance[k]
+                            near = near and abs(points[j, k] - points[i, k]) <= tolerance[i, k]
                         if near and j < first[i]:
                             first[i] = j
                         j = behind[j]
         if first[i] == i:
-            slot = _slot(
-                np.int64((p[0] - low[0]) // cell[0]),
-                np.int64((p[1] - low[1]) // cell[1]),
-                np.int64((p[2] - low[2]) // cell[2]),
-                size,
-            )
+            slot = _slot(part[i], x >> 2, y >> 2, z >> 2, size)
             behind[i] = head[slot]
             head[slot] = i
 
 
 @kernel
-def _slot(a, b, c, size):  # type: ignore[no-untyped-def]
-    """A place in a hash table of `size` (a power of two) for a cell of a grid."""
-    key = np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
+def _slot(part, a, b, c, size):  # type: ignore[no-untyped-def]
+    """A place in a hash table of `size` (a power of two) for a cell of a grid in a part."""
+    key = np.uint64(part) * np.uint64(0xD6E8FEB86659FD93)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(29))) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> np.uint64(29))) + np.uint64(c) * np.uint64(0x94D049BB133111EB)
     key ^= key >> np.uint64(32)
@@ -319,7 +352,10 @@ def _slot(a, b, c, size):  # type: ignore[no-untyped-def]
 
 @kernel
 def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-untyped-def]
-    """Flip the faces `flat` with their neighbours, in place; those that cannot be get the vertex 0 three times."""
+    """Flip the faces `flat` with their neighbours, in place; those that cannot be get the vertex 0 three times.
+
+    Flat faces that this makes are flipped in turn, but needles are left.
+    """
     queue = list(flat)
     budget = 8 * len(flat)
     position = 0
@@ -327,12 +363,16 @@ def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-unty
         f = queue[position]
         position += 1
         longest = -1.0
+        shortest = np.inf
         i = 0
         for k in range(3):
             edge = vertices[faces[f, (k + 1) % 3]] - vertices[faces[f, k]]
-            if np.dot(edge, edge) > longest:
-                longest = np.dot(edge, edge)
+            shortest = min(shortest, dot(edge, edge))
+            if dot(edge, edge) > longest:
+                longest = dot(edge, edge)
                 i = k
+        if shortest <= MAX_NEEDLE_RATIO**2 * longest:
+            continue
         t = twin[3 * f + i]
         p, q, b = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
         if t < 0 or t // 3 == f or faces[t // 3, (t % 3 + 2) % 3] == b or position > budget:
@@ -342,7 +382,7 @@ def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-unty
         # Seen from g its edge runs r to s and its apex is d; b lies between r and s.
         r, s, d = faces[g, j], faces[g, (j + 1) % 3], faces[g, (j + 2) % 3]
         along = vertices[s] - vertices[r]
-        share = np.dot(vertices[b] - vertices[r], along) / longest
+        share = dot(vertices[b] - vertices[r], along) / longest
         uv_r, uv_s, uv_d = uv[g, j].copy(), uv[g, (j + 1) % 3].copy(), uv[g, (j + 2) % 3].copy()
         uv_b = uv_r + share * (uv_s - uv_r)
         side_q = twin[3 * f + (i + 1) % 3]
@@ -386,6 +426,6 @@ def _detach(faces, twin, f):  # type: ignore[no-untyped-def]
 @kernel
 def _is_flat(vertices, faces, f):  # type: ignore[no-untyped-def]
     a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-    normal = np.cross(b - a, c - a)
-    longest = max(np.dot(b - a, b - a), np.dot(c - b, c - b), np.dot(a - c, a - c))
-    return np.sqrt(np.dot(normal, normal)) <= MIN_HEIGHT * longest
+    normal = cross(b - a, c - a)
+    longest = max(dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c))
+    return np.sqrt(dot(normal, normal)) <= MIN_HEIGHT * longest

@@ -43,7 +43,9 @@ def match_twins(vertices: Points, faces: Faces) -> tuple[Ints, Ints]:
     key = np.minimum(tail, head) * (len(vertices) + 1) + np.maximum(tail, head)
     order = np.argsort(key, kind="stable")
     key = key[order]
-    begin = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
+    begin = (
+        np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
+    )
     count = np.diff(np.append(begin, len(key)))
     twin = np.full(len(tail), -1, np.int64)
     two = begin[count == 2]
@@ -77,7 +79,9 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
     total = np.bincount(component, area, components)
     kept = np.bincount(component, area * sign, components)
     # Volumes about the middle of each component, so that a far origin costs no digits.
-    middle = np.stack([np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1)
+    middle = np.stack(
+        [np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1
+    )
     middle /= np.bincount(component, minlength=components)[:, None]
     arm = corner.mean(axis=1) - middle[component]
     volume = np.bincount(component, sign * np.einsum("ij,ij->i", arm, normal) / 6.0, components)
@@ -120,9 +124,33 @@ def count_boundary_loops(faces: Faces, twin: Ints) -> int:
     tail = faces.ravel()[boundary]
     head = np.roll(faces, -1, axis=1).ravel()[boundary]
     vertices, ends = np.unique(np.concatenate([tail, head]), return_inverse=True)
-    label = np.arange(len(vertices))
-    _unite(label, ends.reshape(2, -1))
+    label = merged(len(vertices), ends.reshape(2, -1))
     return int((label == np.arange(len(label))).sum())
+
+
+def merged(vertex_count: int, pairs: Ints) -> Ints:
+    """For each vertex the smallest of those that `pairs` (2, k) join it to, (n,)."""
+    label = np.arange(vertex_count)
+    _unite(label, pairs)
+    while (label[label] != label).any():
+        label = label[label]
+    return label
+
+
+@kernel
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """Scalar product of two vectors (3,), without the BLAS that NumPy's own would call."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):  # type: ignore[no-untyped-def]
+    """Vector product (3,) of two vectors (3,)."""
+    c = np.empty(3)
+    c[0] = a[1] * b[2] - a[2] * b[1]
+    c[1] = a[2] * b[0] - a[0] * b[2]
+    c[2] = a[0] * b[1] - a[1] * b[0]
+    return c
 
 
 @kernel
@@ -143,20 +171,24 @@ def _pair(vertices, faces, order, begin, count, twin):  # type: ignore[no-untype
             h = around[i]
             forward[i] = faces[h // 3, h % 3] == tail
             arm = vertices[faces[h // 3, (h % 3 + 2) % 3]] - a
-            arm = arm - axis * (np.dot(arm, axis) / np.dot(axis, axis))
-            apex[i] = arm / np.sqrt(np.dot(arm, arm))
+            arm = arm - axis * (dot(arm, axis) / dot(axis, axis))
+            apex[i] = arm / np.sqrt(dot(arm, arm))
         for agreeing in (True, False):
             while True:
                 best = 2.0
                 left, right = -1, -1
                 for i in range(n):
                     for j in range(i):
-                        if twin[around[i]] >= 0 or twin[around[j]] >= 0 or (forward[i] != forward[j]) != agreeing:
+                        if (
+                            twin[around[i]] >= 0
+                            or twin[around[j]] >= 0
+                            or (forward[i] != forward[j]) != agreeing
+                        ):
                             continue
                         one, other = (apex[i], apex[j]) if forward[i] else (apex[j], apex[i])
                         # Of pairs that bend alike, ridges first: they keep two touching solids apart.
-                        bend = np.dot(one, other)
-                        if np.dot(axis, np.cross(one, other)) > 0:
+                        bend = dot(one, other)
+                        if dot(axis, cross(one, other)) > 0:
                             bend += 1e-6
                         if bend < best:
                             best = bend

@@ -45,7 +45,9 @@ def _split_quads(
     def along(a: int, b: int, c: int) -> NDArray[np.float64]:
         return np.einsum("ij,ij->i", np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a]), normal)  # type: ignore[no-any-return]
 
-    other = (np.minimum(along(0, 1, 2), along(0, 2, 3)) <= 0) & (np.minimum(along(0, 1, 3), along(1, 2, 3)) > 0)
+    other = (np.minimum(along(0, 1, 2), along(0, 2, 3)) <= 0) & (
+        np.minimum(along(0, 1, 3), along(1, 2, 3)) > 0
+    )
     pattern = np.where(other[:, None, None], [[0, 1, 3], [1, 2, 3]], [[0, 1, 2], [0, 2, 3]])
     return first[:, None, None] + pattern
 

@@ -66,7 +66,9 @@ def _vertices(lines: Lines, v: NDArray[np.int64]) -> tuple[NDArray[np.float64], 
     wrong = np.flatnonzero(~np.isin(fields, (3, 4, 6, 7)))
     if len(wrong):
         line = v[wrong[0]]
-        raise CorruptError(f"line {lines.number[line]}: a vertex has 3 coordinates, this one {lines.fields[line]}")
+        raise CorruptError(
+            f"line {lines.number[line]}: a vertex has 3 coordinates, this one {lines.fields[line]}"
+        )
     values = lines.numbers(v)
     first = np.cumsum(fields) - fields
     positions = values[first[:, None] + np.arange(3)]

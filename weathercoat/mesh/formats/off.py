@@ -73,7 +73,9 @@ def _vertices(
     wrong = np.flatnonzero(~np.isin(fields, allowed))
     if len(wrong):
         row = rows[wrong[0]]
-        raise CorruptError(f"line {lines.number[row]}: a vertex has {allowed[0]} numbers, this one {lines.fields[row]}")
+        raise CorruptError(
+            f"line {lines.number[row]}: a vertex has {allowed[0]} numbers, this one {lines.fields[row]}"
+        )
     values = lines.numbers(rows)
     first = np.cumsum(fields) - fields
     positions = values[first[:, None] + np.arange(3)].reshape(-1, 3)
@@ -92,7 +94,9 @@ def _faces(lines: Lines, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], ND
     corners = np.zeros(int(lines.fields[rows].sum()), np.int64)
     used, bad = _parse_counted(lines.buffer, lines.begin[rows], lines.end[rows], sizes, corners)
     if bad >= 0:
-        raise CorruptError(f"line {lines.number[rows[bad]]}: {lines.text(rows[bad])[:60]!r} is no face of OFF")
+        raise CorruptError(
+            f"line {lines.number[rows[bad]]}: {lines.text(rows[bad])[:60]!r} is no face of OFF"
+        )
     return corners[:used], sizes
 
 

@@ -19,6 +19,7 @@ class Polygons:
     uv: float64 (k, 2), a texture coordinate per corner, or None.
     face_group: int32 (m,), an index into `groups`.
     colors: float64 (n, 4), RGBA from 0 to 1, sRGB-encoded, or None.
+    part: int64 (n,), vertices of different parts (instances, nodes) are never welded; or None.
     single_precision: positions are stored as float32, so that equal points may differ by its rounding.
     shared: faces of this format share their vertices by index, so that a repeated position is worth a note.
     """
@@ -30,6 +31,7 @@ class Polygons:
     face_group: NDArray[np.int32] | None = None
     groups: tuple[str, ...] = ("default",)
     colors: NDArray[np.float64] | None = None
+    part: NDArray[np.int64] | None = None
     single_precision: bool = False
     shared: bool = True
     notes: list[Note] = field(default_factory=list)

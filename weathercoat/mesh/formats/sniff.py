@@ -19,7 +19,10 @@ FOREIGN = (
 
 _STRANGERS = (
     (re.compile(rb"\s*(<!doctype html|<html|<head|<body)", re.IGNORECASE), "an HTML page"),
-    (re.compile(rb"version https://git-lfs"), "a git-LFS pointer (fetch the file itself with `git lfs pull`)"),
+    (
+        re.compile(rb"version https://git-lfs"),
+        "a git-LFS pointer (fetch the file itself with `git lfs pull`)",
+    ),
     (re.compile(rb"\x1f\x8b"), "gzip-compressed data"),
     (re.compile(rb"BZh|\xfd7zXZ\0|7z\xbc\xaf|Rar!|\x28\xb5\x2f\xfd"), "a compressed archive"),
     (re.compile(rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0|RIFF....WEBP", re.DOTALL), "a picture"),
@@ -44,7 +47,11 @@ def identify(data: bytes, extension: str) -> tuple[str, Note | None]:
             raise FormatError(f"looks like {name}")
     content = _content(data)
     if extension and not known:
-        seems = f"; the content looks like {content.upper()}, which --format {content} would read" if content else ""
+        seems = (
+            f"; the content looks like {content.upper()}, which --format {content} would read"
+            if content
+            else ""
+        )
         raise FormatError(f"the extension .{extension} is unknown{seems}")
     if content is None:
         return _by_extension(data, extension), None
@@ -97,16 +104,22 @@ def _by_extension(data: bytes, extension: str) -> str:
     start = _text_start(data)
     if extension in FOREIGN:
         return extension
-    if extension == "stl" and (looks_like_coordinates(data) or data[:80].lstrip().lower().startswith(b"solid")):
+    if extension == "stl" and (
+        looks_like_coordinates(data) or data[:80].lstrip().lower().startswith(b"solid")
+    ):
         return "stl"
     if start is None:
         utf16 = len(data) >= 4 and (data[:64:2].count(0) > 24 or data[1:64:2].count(0) > 24)
-        raise FormatError("looks like " + ("UTF-16 text without a byte order mark" if utf16 else "binary data"))
+        raise FormatError(
+            "looks like " + ("UTF-16 text without a byte order mark" if utf16 else "binary data")
+        )
     if extension == "obj" and _only_comments(start):
         return "obj"
     if extension == "off" and start.split()[:1] == [b"OFF"]:
         return "off"
-    raise FormatError("looks like text" + (f", but not like {extension.upper()}" if extension else " of no known format"))
+    raise FormatError(
+        "looks like text" + (f", but not like {extension.upper()}" if extension else " of no known format")
+    )
 
 
 def _only_comments(start: bytes) -> bool:
