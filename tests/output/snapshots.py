@@ -79,9 +79,9 @@ def make_snapshot(
 
 
 def make_grouped_surface() -> Surface:
-    """Two groups of the sheet with texture coordinates that have a seam between them, and vertex colours."""
+    """The sheet in two halves, with texture coordinates that have a seam between them, and vertex colours."""
     vertices, faces = make_sheet(2)
-    group = (np.arange(len(faces)) >= 4).astype(np.int32)
+    group = (vertices[faces][:, :, 0].mean(axis=1) > 0.5).astype(np.int32)
     uv = vertices[faces][:, :, [0, 2]] + group[:, None, None]
     colors = np.column_stack([vertices[:, [0, 2]], np.full(len(vertices), 0.5), np.ones(len(vertices))])
     return make_surface(vertices, faces, face_group=group, groups=("body", "tyre left"), uv=uv, colors=colors)

@@ -6,6 +6,7 @@ What lies in it:
     timing.json     seconds by stage; the only file that differs from run to run
     preview.png     contact sheet over time
     snapshots/      step_0100.ply and step_0100.glb for each recorded step
+    untouched.ply   the parts that carry no paint, where there are any; each GLB holds them as well
 """
 
 from __future__ import annotations

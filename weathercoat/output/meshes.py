@@ -25,9 +25,10 @@ def write_mesh(
 ) -> None:
     """Write a surface to a path, in the format of its extension or the one named, or to a binary stream.
 
-    OBJ keeps groups and texture coordinates, GLB both and vertex colours (turned y-up), PLY colours and
-    groups (a face property `group`, its names in comments), STL and OFF the bare triangles. A file appears
-    only once it is whole. Raises UsageError for a format that is not written, OutputExistsError, OutputError.
+    OBJ keeps groups, texture coordinates and vertex colours (after the position), GLB all three (turned
+    y-up), PLY colours and groups (a face property `group`, its names in comments), STL and OFF the bare
+    triangles. A file appears only once it is whole. Raises UsageError for a format that is not written,
+    OutputExistsError, OutputError.
     """
     if format is None:
         if not isinstance(target, (str, Path)):
@@ -47,7 +48,10 @@ def write_mesh(
 
 
 def _write_obj(stream: BinaryIO, surface: Surface) -> None:
-    for text in _lines("v %r %r %r\n", surface.vertices):
+    columns = surface.vertices
+    if surface.colors is not None:
+        columns = np.column_stack([columns, surface.colors[:, :3]])
+    for text in _lines("v" + " %r" * columns.shape[1] + "\n", columns):
         stream.write(text)
     corner = surface.faces + 1
     row = "f %d %d %d\n"
