@@ -176,12 +176,12 @@ class Adhesion(Section):
     """What holds the film to the metal: a base with improved Perlin noise on it, falling with age."""
 
     base: Real = parameter(1.0, "Mean at the start", symbol="A", ge=0, le=1e6)
-    amplitude: Real = parameter(0.5, "Amplitude of the noise", ge=0, le=1e6)
-    wavelength: Real = parameter(0.25, "Wavelength of the coarsest octave", unit="sizes", ge=1e-4, le=1000)
-    octaves: Whole = parameter(3, "Octaves of noise, each of half the wavelength before", ge=1, le=16)
-    gain: Real = parameter(0.5, "Amplitude of an octave relative to the one before", ge=0, le=1)
+    amplitude: Real = parameter(0.8, "Amplitude of the noise", ge=0, le=1e6)
+    wavelength: Real = parameter(0.3, "Wavelength of the coarsest octave", unit="sizes", ge=1e-4, le=1000)
+    octaves: Whole = parameter(4, "Octaves of noise, each of half the wavelength before", ge=1, le=16)
+    gain: Real = parameter(0.65, "Amplitude of an octave relative to the one before", ge=0, le=1)
     decay_rate: Real = parameter(
-        1.0, "Share of the base that is lost, not below 0", unit="per age", ge=0, le=1e6
+        0.5, "Share of the base that is lost, not below 0", unit="per age", ge=0, le=1e6
     )
 
 
@@ -205,7 +205,7 @@ class Defects(Section):
     rule: Literal["per_area", "share"] = parameter(
         "per_area", "Number by area, whatever the mesh, or a share of the edges (the paper)"
     )
-    density: Real = parameter(100.0, "Defects with the rule per_area", unit="per size squared", ge=0, le=1e8)
+    density: Real = parameter(400.0, "Defects with the rule per_area", unit="per size squared", ge=0, le=1e8)
     share: Real = parameter(0.01, "Share of the edges with the rule share", ge=0, le=1)
     strength: Real = parameter(0.001, "Cohesion of a defect relative to the others", ge=0, le=1)
 
@@ -260,7 +260,7 @@ class Flaking(Section):
         "islands", "Whole pieces that nothing holds any more, or single faces (the paper)"
     )
     hanging_share: Real = parameter(
-        0.05, "A piece also falls when less than this share of its outline still hangs", ge=0, lt=1
+        0.08, "A piece also falls when less than this share of its outline still hangs", ge=0, lt=1
     )
 
 
@@ -270,8 +270,8 @@ class Curl(Section):
     rule: Literal["curvature", "angle"] = parameter(
         "curvature", "A curvature of the paint, or an angle per edge (the paper)"
     )
-    radius: Real = parameter(0.08, "Radius that the film curls to", unit="sizes", ge=1e-5, le=1e5)
-    rate: Real = parameter(4.0, "Rate at which the curvature grows", unit="per age", ge=0, le=1e6)
+    radius: Real = parameter(0.05, "Radius that the film curls to", unit="sizes", ge=1e-5, le=1e5)
+    rate: Real = parameter(10.0, "Rate at which the curvature grows", unit="per age", ge=0, le=1e6)
     angle_rate: Real = parameter(
         0.8, "Fall of the target with the rule angle", unit="radians per age", symbol="φ₀", ge=0, le=1e6
     )

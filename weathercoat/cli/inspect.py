@@ -1,0 +1,74 @@
+"""`weathercoat inspect`: what a model is, what its repair did, and what a run would cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+from weathercoat.cli import options
+
+
+@click.command()
+@options.model
+@click.option("--self-intersections", is_flag=True, help="Look for faces that cut through others too.")
+@click.option(
+    "--config", "config", metavar="CONFIG", default="standard", help="Config whose run is estimated."
+)
+@options.assignments
+@options.model_format
+@options.as_json
+@options.debug
+def command(
+    model: str,
+    self_intersections: bool,
+    config: str,
+    assignments: tuple[str, ...],
+    model_format: str | None,
+    as_json: bool,
+) -> None:
+    """Tell the faces, components, boundary and manifoldness of MODEL, its repairs, and the cost of a run."""
+    from weathercoat.cli.cost import estimate_cost
+    from weathercoat.cli.reading import read_model
+    from weathercoat.config.load import load_config
+    from weathercoat.mesh.inspect import inspect_surface
+
+    loaded = load_config(config, assignments)
+    surface = read_model(model, model_format, up=loaded.config.model.up)
+    found = inspect_surface(surface, self_intersections=self_intersections)
+    cost = estimate_cost(loaded.config, len(surface.faces))
+    found["run_cost"] = {"seconds": round(cost.seconds, 1), "memory_mb": round(cost.memory / 1e6)}
+    if as_json:
+        click.echo(json.dumps(found, indent=2, ensure_ascii=False))
+    else:
+        click.echo("\n".join(_lines(found)))
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    """The findings for people, one a line; a list of findings has a line for each."""
+    for key, value in found.items():
+        title = key.replace("_", " ")
+        if key == "notes":
+            yield from (f"{'repair':18} {note['code']}({note['count']}): {note['message']}" for note in value)
+        elif key == "groups":
+            yield from (f"{'group':18} {group['name']}: {group['faces']:,} faces" for group in value)
+        elif key == "run_cost":
+            yield f"{'a run would take':18} about {value['seconds']:,.0f} s and {value['memory_mb']:,} MB"
+        elif isinstance(value, dict):
+            yield f"{title:18} " + ", ".join(f"{name} {_shown(part)}" for name, part in value.items())
+        else:
+            yield f"{title:18} {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(f"({_shown(part)})" if isinstance(part, list) else _shown(part) for part in value)
+    return str(value)

@@ -1,0 +1,76 @@
+"""Options and arguments that several subcommands share, so that each is spelled and explained once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from weathercoat.config.presets import preset_names
+
+
+class _ConfigName(click.ParamType):
+    name = "config"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        shipped = [CompletionItem(name) for name in preset_names() if name.startswith(incomplete)]
+        return [*shipped, CompletionItem(incomplete, type="file")]
+
+
+class _Assignment(click.ParamType):
+    name = "key=value"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from weathercoat.config.schema import parameters
+
+        matching = (parameter for parameter in parameters() if parameter.key.startswith(incomplete))
+        return [CompletionItem(f"{parameter.key}=", help=parameter.description) for parameter in matching]
+
+
+config = click.argument("config", type=_ConfigName())
+model = click.argument("model", type=click.Path(path_type=str))
+assignments = click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    type=_Assignment(),
+    metavar="KEY=VALUE",
+    help="Override a value of the config, such as curl.radius=0.1; may be given several times.",
+)
+seed = click.option("--seed", type=int, metavar="N", help="Override seed.")
+steps = click.option("--steps", type=int, metavar="N", help="Override ageing.steps.")
+faces = click.option("--faces", type=int, metavar="N", help="Override remesh.faces.")
+model_format = click.option(
+    "--format",
+    "model_format",
+    metavar="NAME",
+    help="Format of the model, where its content and extension do not tell.",
+)
+quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, no messages but errors.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
+overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")
+strict = click.option("--strict", is_flag=True, help="Refuse a model that needs any repair.")
+log_file = click.option(
+    "--log-file", type=click.Path(path_type=Path, dir_okay=False), help="Write all messages to a file too."
+)
+debug = click.option("--debug", is_flag=True, expose_value=False, help="Print the traceback of an error.")
+
+
+def output(what: str, *, required: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option -o for `what`."""
+    return click.option(
+        "-o",
+        "--output",
+        "output",
+        type=click.Path(path_type=Path),
+        metavar="PATH",
+        required=required,
+        help=what,
+    )

@@ -1,0 +1,100 @@
+"""`weathercoat render`: pictures of a finished run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from weathercoat.cli import options
+from weathercoat.errors import CorruptError, UsageError
+
+if TYPE_CHECKING:
+    from weathercoat.config.schema import Config
+    from weathercoat.output.pictures import Image
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@options.output("The PNG.", required=True)
+@click.option(
+    "--step", type=int, metavar="N", help="Draw the snapshot of this step alone, not a sheet of all."
+)
+@click.option("--width", type=click.IntRange(16, 16_384), metavar="PIXELS", help="Width of a picture.")
+@click.option("--height", type=click.IntRange(16, 16_384), metavar="PIXELS", help="Height of a picture.")
+@click.option("--azimuth", type=float, metavar="DEGREES", help="Turn of the view about the model.")
+@click.option("--elevation", type=click.FloatRange(-89, 89), metavar="DEGREES", help="Height of the view.")
+@options.overwrite
+@options.debug
+def command(run: Path, output: Path, step: int | None, overwrite: bool, **view: float | None) -> None:
+    """Draw RUN, the folder of a finished run or its folder of snapshots, as a PNG."""
+    from weathercoat.output.folder import whole_file
+    from weathercoat.output.pictures import write_png
+
+    with whole_file(output, overwrite=overwrite) as stream:
+        write_png(
+            stream, _draw(run, step, {name: value for name, value in view.items() if value is not None})
+        )
+    click.echo(f"written to {output}")
+
+
+def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
+    """The picture of one step, or the contact sheet of all."""
+    from weathercoat.mesh.read import read_surface
+    from weathercoat.output.folder import REPORT, read_run
+    from weathercoat.output.pictures import contact_sheet, frame_camera, render_snapshot
+    from weathercoat.run import picture_parameters
+
+    if not (run / REPORT).exists() and (run.parent / REPORT).exists():
+        run = run.parent
+    report, snapshots = read_run(run)
+    if step is not None:
+        snapshots = [snapshot for snapshot in snapshots if snapshot.step == step]
+        if not snapshots:
+            steps = ", ".join(str(row["step"]) for row in report["snapshots"])
+            raise UsageError(
+                f"the run has no snapshot of step {step}", file=str(run), remedy=f"there are {steps}"
+            )
+    config = _config_of(report, run / REPORT)
+    parameters = replace(picture_parameters(config), **view)
+    up = _up_of(report, config)
+    untouched = run / "untouched.ply"
+    unpainted = read_surface(untouched) if untouched.exists() else None
+    camera = frame_camera(snapshots[0], parameters, up=up)
+    images = [
+        render_snapshot(snapshot, parameters, up=up, untouched=unpainted, camera=camera)
+        for snapshot in snapshots
+    ]
+    if step is not None:
+        return images[0]
+    return contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in snapshots], min(3, len(images)))
+
+
+def _config_of(report: dict[str, Any], path: Path) -> Config:
+    from pydantic import ValidationError
+
+    from weathercoat.config.schema import Config
+
+    try:
+        return Config.model_validate(report.get("config"))
+    except ValidationError as error:
+        raise CorruptError("holds no config of this version", file=str(path), remedy="run again") from error
+
+
+def _up_of(report: dict[str, Any], config: Config) -> tuple[float, float, float]:
+    """The direction against gravity that the run took, by its config or else by its model's extension."""
+    from weathercoat.mesh.read import UP_OF_FORMAT
+
+    up: str | tuple[float, float, float] = config.model.up
+    if up == "auto":
+        model = next(iter(report.get("inputs", ())), "")
+        up = UP_OF_FORMAT.get(Path(model).suffix.lower().lstrip("."), "z")
+    if isinstance(up, str):
+        sign = -1.0 if up.startswith("-") else 1.0
+        x, y, z = (sign * (up[-1] == axis) for axis in "xyz")
+    else:
+        x, y, z = (part / math.hypot(*up) for part in up)
+    return x, y, z

@@ -1,0 +1,100 @@
+"""`weathercoat run`: age one model."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from weathercoat.cli import options
+from weathercoat.cli.messages import Messages
+
+if TYPE_CHECKING:
+    from weathercoat.config.load import Override
+
+
+@click.command()
+@options.config
+@options.model
+@options.output("Folder of the results; MODEL-CONFIG by default.")
+@options.assignments
+@options.seed
+@options.steps
+@options.faces
+@options.model_format
+@options.overwrite
+@options.strict
+@options.quiet
+@options.as_json
+@options.log_file
+@options.debug
+def command(
+    config: str,
+    model: str,
+    output: Path | None,
+    assignments: tuple[str, ...],
+    seed: int | None,
+    steps: int | None,
+    faces: int | None,
+    model_format: str | None,
+    overwrite: bool,
+    strict: bool,
+    quiet: bool,
+    as_json: bool,
+    log_file: Path | None,
+) -> None:
+    """Age the paint of MODEL by the rules of CONFIG.
+
+    CONFIG is a YAML file or the name of a shipped config (see `weathercoat config list`). MODEL is a mesh,
+    or - for standard input. The folder of the results appears only once it is whole.
+    """
+    from weathercoat.config.load import load_config
+    from weathercoat.output.folder import safe_name
+
+    loaded = load_config(config, [*assignments, *_shortcuts(seed, steps, faces)])
+    is_piped = model == "-"
+    stem = "model" if is_piped else Path(model).stem
+    folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
+    with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
+        from weathercoat.run import run_asset
+
+        report = run_asset(
+            loaded,
+            sys.stdin.buffer if is_piped else model,
+            folder,
+            format=model_format,
+            overwrite=overwrite,
+            strict=strict,
+            progress=messages.progress,
+            log=messages.log,
+        )
+    if as_json:
+        click.echo(json.dumps(report, indent=2, ensure_ascii=False))
+    else:
+        click.echo("\n".join([*_table(report), f"written to {folder}"]))
+
+
+def _shortcuts(seed: int | None, steps: int | None, faces: int | None) -> Iterator[Override]:
+    from weathercoat.config.load import Override
+
+    for option, key, value in (
+        ("seed", "seed", seed),
+        ("steps", "ageing.steps", steps),
+        ("faces", "remesh.faces", faces),
+    ):
+        if value is not None:
+            yield Override(key, value, f"--{option}")
+
+
+def _table(report: dict[str, Any]) -> Iterator[str]:
+    """What became of the paint, one line a snapshot."""
+    yield f"{'step':>8} {'age':>6} {'separated':>10} {'lost':>7} {'flakes':>7} {'rust':>6}"
+    for row in report["snapshots"]:
+        yield (
+            f"{row['step']:8d} {row['age']:6.2f} {row['separated_share']:10.1%} {row['lost_share']:7.1%}"
+            f" {row['flakes']['count']:7d} {row['substrate_rust']:6.2f}"
+        )
