@@ -42,12 +42,13 @@ class Camera:
     def directions(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64], width: int, height: int
     ) -> NDArray[np.float32]:
-        """Unit directions through the centres of the pixels at `rows` x `columns` of a picture, (rows * columns, 3)."""
+        """Directions, not of unit length, through the centres of the pixels at `rows` x `columns`, (rows * columns, 3)."""
         x = ((columns + 0.5) / width * 2.0 - 1.0) * self.tangent_x
         y = (1.0 - (rows + 0.5) / height * 2.0) * self.tangent_y
-        direction = self.forward + x[None, :, None] * self.right + y[:, None, None] * self.up
-        direction /= np.linalg.norm(direction, axis=2, keepdims=True)
-        return direction.reshape(-1, 3).astype(np.float32)
+        direction = np.empty((len(rows), len(columns), 3), np.float32)
+        for axis in range(3):
+            direction[:, :, axis] = np.add.outer(self.forward[axis] + y * self.up[axis], x * self.right[axis])
+        return direction.reshape(-1, 3)
 
 
 def make_camera(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from weathercoat.sim.snapshot import Snapshot
 
 _GAP = 0.25  # of the film's thickness: the film floats this far above the metal, so that no two surfaces coincide
 _BEVEL = 0.4  # of the film's thickness
-_OUTLINE_PASSES = 2
+_OUTLINE_PASSES = 1
 _FILM_CREASE = np.radians(60.0)  # curls on coarse meshes turn by more than a crease of the metal does
-_METAL_CREASE = np.radians(40.0)
+_METAL_CREASE = np.radians(45.0)
 
 
 @dataclass(frozen=True)
@@ -88,10 +88,6 @@ class Samples:
     rust: Vectors
     layer: Vectors
 
-    def take(self, index: NDArray[np.int64]) -> Samples:
-        """Those at `index`."""
-        return Samples(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
-
 
 def make_display_mesh(
     snapshot: Snapshot,
@@ -102,7 +98,7 @@ def make_display_mesh(
     paint: Vectors,
     untouched: Surface | None = None,
 ) -> DisplayMesh:
-    """The display mesh of a snapshot; thicknesses are in sizes, `paint` (3,) or (film vertices, 3) is linear."""
+    """The display mesh of a snapshot; thicknesses are in sizes, `paint` (3,) is the film's linear colour."""
     rest = normalise(snapshot.substrate_vertices)
     parts = [_metal(snapshot, rest, metal_thickness)]
     if len(snapshot.film_faces):

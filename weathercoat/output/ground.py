@@ -36,12 +36,10 @@ def ground_shadow(
     above = float(camera.position @ up) - level
     if above <= 0.0:
         return factor
-    direction = camera.directions(np.arange(height), np.arange(width), width, height).astype(np.float64)
+    direction = camera.directions(np.arange(height), np.arange(width), width, height)
     descent = -(direction @ up)
-    distance = np.divide(above, descent, out=np.full(len(descent), np.inf), where=descent > 1e-6)
-    distance[~wanted.ravel()] = np.inf
-    met = np.flatnonzero(np.isfinite(distance))
-    point = camera.position + distance[met, None] * direction[met]
+    met = np.flatnonzero((descent > 1e-6) & wanted.ravel())
+    point = camera.position + (above / descent[met])[:, None] * direction[met]
     away = np.linalg.norm(point - (point @ up)[:, None] * up, axis=1)
     near = away < radius
     met, point, away = met[near], point[near], away[near]
@@ -57,8 +55,8 @@ def ground_shadow(
     number = np.full(wanted.shape, -1, np.int32)
     number[row, column] = np.arange(len(met), dtype=np.int32)
     smooth_lit, smooth_sky = np.empty_like(lit), np.empty_like(sky)
-    for _ in range(2):
-        filter_light(number, 1, row, column, point, facet, 1e-3, lit, sky, smooth_lit, smooth_sky)
+    for stride in (1, 3):
+        filter_light(number, stride, row, column, point, facet, 1e-3, lit, sky, smooth_lit, smooth_sky)
         lit, sky, smooth_lit, smooth_sky = smooth_lit, smooth_sky, lit, sky
     light = _KEY_SHARE * lit + (1.0 - _KEY_SHARE) * sky[:, 0]
     fade = np.clip((radius - away) / (0.4 * radius), 0.0, 1.0)

@@ -113,13 +113,26 @@ def key_directions(row, column, key, index, total, out):  # type: ignore[no-unty
 
 
 @kernel
-def share_samples(sample, kind, position, facet, factor, tolerance, leader):  # type: ignore[no-untyped-def]
+def share_samples(sample, face, weights, vertices, faces, kind, factor, tolerance, leader):  # type: ignore[no-untyped-def]
     """Let the samples of a pixel that lie on one smooth surface share their light and colour.
 
     sample int32 (height, width): the number of the sample at each place, -1 where there is none; a pixel is a square of
-    `factor` samples a side. `leader` (s,) gets the number of the sample to use in place of each.
+    `factor` samples a side. face (s,), weights (s, 2): where the samples lie on the mesh; kind (t,) of its faces.
+    `leader` (s,) gets the number of the sample to use in place of each: the first of its pixel that has the same kind,
+    turns by less than 14 degrees, and lies within `tolerance` of its plane.
     """
     height, width = sample.shape
+    position, facet = np.empty((len(face), 3)), np.empty((len(face), 3))
+    for i in range(len(face)):
+        a, b, c = vertices[faces[face[i], 0]], vertices[faces[face[i], 1]], vertices[faces[face[i], 2]]
+        squared = 0.0
+        for x in range(3):
+            y, z = (x + 1) % 3, (x + 2) % 3
+            facet[i, x] = (b[y] - a[y]) * (c[z] - a[z]) - (b[z] - a[z]) * (c[y] - a[y])
+            position[i, x] = a[x] + weights[i, 0] * (b[x] - a[x]) + weights[i, 1] * (c[x] - a[x])
+            squared += facet[i, x] * facet[i, x]
+        for x in range(3):
+            facet[i, x] /= max(np.sqrt(squared), 1e-300)
     for r in range(height):
         for c in range(width):
             i = sample[r, c]
@@ -128,7 +141,7 @@ def share_samples(sample, kind, position, facet, factor, tolerance, leader):  # 
             leader[i] = i
             for before in range((r % factor) * factor + c % factor):
                 j = sample[r - r % factor + before // factor, c - c % factor + before % factor]
-                if j < 0 or leader[j] != j or kind[j] != kind[i]:
+                if j < 0 or leader[j] != j or kind[face[j]] != kind[face[i]]:
                     continue
                 cosine, away = 0.0, 0.0
                 for axis in range(3):

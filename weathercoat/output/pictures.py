@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from weathercoat.errors import OutputError
 from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.camera import Camera, make_camera
-from weathercoat.output.display import DisplayMesh, Normalisation, Samples, make_display_mesh
+from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
 from weathercoat.output.ground import ground_shadow
 from weathercoat.output.lighting import filter_light, gather_light, share_samples
 from weathercoat.output.rays import RayQueries, make_rays
@@ -36,7 +36,7 @@ class PictureParameters:
     width, height: pixels. azimuth, elevation: degrees of the view, see `camera.make_camera`; margin: share of half the
     picture that stays free on each side. samples: side of the square of samples in each pixel; sky_rays, key_rays: rays
     for each sample towards the sky and the key light; reach: distance within which things block the sky.
-    paint: colour of the film's front, or None for the snapshot's own film colours, taken as they are (stains included).
+    Colours are those of clean materials: the stains come from the snapshot's scalars.
     """
 
     width: int = 520
@@ -48,14 +48,14 @@ class PictureParameters:
     sky_rays: int = 3
     key_rays: int = 1
     reach: float = 0.6
-    film_thickness: float = 0.0035
+    film_thickness: float = 0.0028
     metal_thickness: float = 0.012
     background: Color = (0.845, 0.845, 0.835)
-    paint: Color | None = (0.16, 0.53, 0.60)
+    paint: Color = (0.16, 0.53, 0.60)
     primer: Color = (0.83, 0.79, 0.70)
     metal: Color = (0.47, 0.49, 0.51)
-    rust_rim: Color = (0.68, 0.40, 0.19)
-    rust_body: Color = (0.52, 0.20, 0.05)
+    rust_rim: Color = (0.64, 0.39, 0.20)
+    rust_body: Color = (0.47, 0.21, 0.09)
     rust_core: Color = (0.20, 0.10, 0.06)
     stain: Color = (0.50, 0.25, 0.09)
     dust: Color = (0.50, 0.46, 0.40)
@@ -95,14 +95,13 @@ def render_snapshot(
     camera: one of `frame_camera`, which is also the default.
     """
     camera = camera or frame_camera(snapshot, parameters, up=up)
-    painted = parameters.paint is not None
     normalise = Normalisation.of(snapshot)
     mesh = make_display_mesh(
         snapshot,
         normalise,
         film_thickness=parameters.film_thickness,
         metal_thickness=parameters.metal_thickness,
-        paint=to_linear(parameters.paint if painted else snapshot.film_color),
+        paint=to_linear(parameters.paint),
         untouched=untouched,
     )
     rays = make_rays(mesh.vertices, mesh.faces)
@@ -110,23 +109,27 @@ def render_snapshot(
     width, height = parameters.width * factor, parameters.height * factor
     face, weights = _first_hits(rays, mesh, camera, width, height)
     seen = np.flatnonzero(face >= 0)
-    samples = mesh.at(face[seen], weights[seen])
-    if not painted:
-        samples.stain[:] = 0.0
     upward = np.asarray(up, np.float64)
     key = key_direction(camera, upward)
-    color = _shaded(rays, samples, seen, camera, upward, key, parameters, width, height)
+    color = _shaded(rays, mesh, face[seen], weights[seen], seen, camera, upward, key, parameters, width, height)
     picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
-    blocks = (parameters.height, factor, parameters.width, factor)
-    coverage = (face >= 0).reshape(blocks).mean(axis=(1, 3))
+    coverage = _pixel_means((face >= 0).astype(np.float32).reshape(height, width, 1), factor)
     placed = normalise(snapshot.substrate_vertices)
     shadow = ground_shadow(
-        rays, camera, coverage < 1.0, up=upward, level=float((placed @ upward).min()) - parameters.metal_thickness,
+        rays, camera, coverage[:, :, 0] < 1.0, up=upward, level=float((placed @ upward).min()) - parameters.metal_thickness,
         radius=1.6 * float(np.linalg.norm(placed, axis=1).max()), key=key, reach=parameters.reach,
     )  # fmt: skip
-    background = ((1.0 - coverage) * shadow)[:, :, None] * to_linear(parameters.background)
-    return to_srgb(picture.reshape(*blocks, 3).mean(axis=(1, 3)) + background)
+    background = (1.0 - coverage) * shadow[:, :, None] * to_linear(parameters.background)
+    return to_srgb(_pixel_means(picture.reshape(height, width, 3), factor) + background)
+
+
+def _pixel_means(samples: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
+    """Means of the squares of `factor` x `factor` samples, (height, width, channels)."""
+    total = samples[::factor, ::factor].copy()
+    for place in range(1, factor * factor):
+        total += samples[place // factor :: factor, place % factor :: factor]
+    return total / np.float32(factor * factor)
 
 
 def _first_hits(
@@ -151,7 +154,9 @@ def _first_hits(
 
 def _shaded(
     rays: RayQueries,
-    samples: Samples,
+    mesh: DisplayMesh,
+    face: NDArray[np.int32],
+    weights: NDArray[np.float32],
     seen: NDArray[np.int64],
     camera: Camera,
     up: Vectors,
@@ -160,15 +165,16 @@ def _shaded(
     width: int,
     height: int,
 ) -> NDArray[np.float32]:
-    """Tone-mapped linear colours of the samples, (s, 3), at the places `seen` of the picture."""
+    """Tone-mapped linear colours (s, 3) of the points on `face` (s,) with `weights` (s, 2), at `seen` in the picture."""
     factor = parameters.samples
     number = np.full((height, width), -1, np.int32)
     number.ravel()[seen] = np.arange(len(seen), dtype=np.int32)
     leader = np.empty(len(seen), np.int32)
-    share_samples(number, samples.kind, samples.position, samples.facet, factor, _SAME_SURFACE, leader)
-    leaders, follows = np.unique(leader, return_inverse=True)
+    share_samples(number, face, weights, mesh.vertices, mesh.faces, mesh.kind, factor, _SAME_SURFACE, leader)
+    is_leader = leader == np.arange(len(leader))
+    leaders, follows = np.flatnonzero(is_leader), (np.cumsum(is_leader) - 1)[leader]
     number.ravel()[seen] = follows
-    s = samples.take(leaders)
+    s = mesh.at(face[leaders], weights[leaders])
     row, column = (seen[leaders] // width).astype(np.int32), (seen[leaders] % width).astype(np.int32)
     lit, sky = gather_light(
         rays, row // factor, column // factor, s.position, s.facet, s.normal,
