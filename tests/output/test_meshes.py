@@ -14,7 +14,7 @@ from tests.output.snapshots import make_grouped_surface, make_sheet
 from weathercoat.errors import OutputExistsError, UsageError
 from weathercoat.mesh.read import read_surface
 from weathercoat.mesh.surface import make_surface
-from weathercoat.output.meshes import WRITERS, write_mesh
+from weathercoat.output.meshes import WRITERS, mesh_format, write_mesh
 from weathercoat.output.ply import read_ply_arrays
 
 
@@ -85,6 +85,8 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     for name in ("a.fbx", "a"):
         with pytest.raises(UsageError, match="not written"):
             write_mesh(tmp_path / name, surface)
+        with pytest.raises(UsageError, match="not written"):
+            mesh_format(tmp_path / name)
     with pytest.raises(UsageError, match="stream"):
         write_mesh(io.BytesIO(), surface)
     assert list(tmp_path.iterdir()) == []

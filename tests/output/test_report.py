@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.output.snapshots import CELLS, make_grouped_surface, make_sheet, make_snapshot
 from weathercoat.errors import AccessError, CheckError, Note
@@ -185,6 +187,38 @@ def test_arrays_and_odd_text_are_written(tmp_path: Path) -> None:
     write_json(tmp_path / "a.json", content)
     back = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
     assert back == {"a": [0, 1], "b": 0.5, "c": True, "d": "é\udc80", "e": None}
+
+
+JSON_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+)
+
+
+@given(st.dictionaries(st.text(), JSON_VALUES, max_size=4))
+def test_every_json_value_reads_back(
+    tmp_path_factory: pytest.TempPathFactory, content: dict[str, Any]
+) -> None:
+    path = tmp_path_factory.mktemp("json") / "a.json"
+    write_json(path, content)
+    assert json.loads(path.read_bytes()) == content
+
+
+def test_lists_of_plain_values_take_one_line(tmp_path: Path) -> None:
+    write_json(tmp_path / "a.json", {"color": [1, 2, 3], "notes": [{"count": 1}], "none": []})
+    assert (
+        (tmp_path / "a.json").read_text()
+        == """{
+  "color": [1, 2, 3],
+  "none": [],
+  "notes": [
+    {
+      "count": 1
+    }
+  ]
+}
+"""
+    )
 
 
 def test_timing_has_the_rows_of_the_table() -> None:

@@ -26,7 +26,6 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 from weathercoat.errors import AccessError, CorruptError, FormatError, OutputError, OutputExistsError
-from weathercoat.output.snapshots import read_snapshot_ply
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
@@ -169,6 +168,8 @@ def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
     Raises AccessError where there is no such folder or report, CorruptError where the report is broken,
     FormatError where the run wrote no PLY snapshots, and what `read_snapshot_ply` raises.
     """
+    from weathercoat.output.snapshots import read_snapshot_ply
+
     folder = Path(path)
     if not folder.is_dir():
         raise AccessError(

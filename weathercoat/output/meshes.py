@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from weathercoat.errors import UsageError
 from weathercoat.mesh.surface import Surface, face_normals
 from weathercoat.output.folder import whole_file
-from weathercoat.output.glb import write_glb
 from weathercoat.output.ply import color_bytes, write_ply
-from weathercoat.output.sheets import surface_nodes
 
 # Rows that are turned into text at a time: enough to amortise the call, little enough to stay in the cache.
 ROWS = 16384
@@ -30,21 +28,27 @@ def write_mesh(
     triangles. A file appears only once it is whole. Raises UsageError for a format that is not written,
     OutputExistsError, OutputError.
     """
-    if format is None:
-        if not isinstance(target, (str, Path)):
-            raise UsageError("the format of a stream must be named", remedy="give --format")
-        format = Path(target).suffix
-    writer = WRITERS.get(format.lower().lstrip("."))
-    if writer is None:
-        known = ", ".join(WRITERS)
-        raise UsageError(
-            f"meshes are not written as {format or 'a file without extension'}", remedy=f"use {known}"
-        )
+    writer = WRITERS[mesh_format(target, format)]
     if isinstance(target, (str, Path)):
         with whole_file(target, overwrite=overwrite) as stream:
             writer(stream, surface)
     else:
         writer(target, surface)
+
+
+def mesh_format(target: Path | str | BinaryIO, format: str | None = None) -> str:
+    """The format that `write_mesh` would take, to be refused before any work; UsageError where it is not
+    written."""
+    if format is None and not isinstance(target, (str, Path)):
+        raise UsageError("the format of a stream must be named", remedy="give --format")
+    wanted = Path(str(target)).suffix if format is None else format
+    name = wanted.lower().lstrip(".")
+    if name not in WRITERS:
+        known = ", ".join(WRITERS)
+        raise UsageError(
+            f"meshes are not written as {wanted or 'a file without extension'}", remedy=f"use {known}"
+        )
+    return name
 
 
 def _write_obj(stream: BinaryIO, surface: Surface) -> None:
@@ -101,6 +105,9 @@ def _write_off(stream: BinaryIO, surface: Surface) -> None:
 
 
 def _write_glb(stream: BinaryIO, surface: Surface) -> None:
+    from weathercoat.output.glb import write_glb
+    from weathercoat.output.sheets import surface_nodes
+
     write_glb(stream, surface_nodes(surface), up=surface.up)
 
 

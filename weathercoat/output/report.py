@@ -211,14 +211,25 @@ def sha256(content: bytes | Path) -> str:
 
 
 def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
-    """Write JSON with sorted keys, floats in the fewest digits that read back as the same double.
+    """Write JSON with sorted keys, lists of plain values on one line, and floats in the fewest digits that
+    are exact.
 
     Raises CheckError for a value that is not finite or that JSON has no form for, naming its key, before
     anything is written; OSError where the file cannot be written.
     """
-    plain = _plain(content, "", Path(path).name)
-    text = json.dumps(plain, sort_keys=True, indent=2, ensure_ascii=False)
+    text = _text(_plain(content, "", Path(path).name), "\n")
     Path(path).write_bytes((text + "\n").encode("utf-8", "backslashreplace"))
+
+
+def _text(value: Any, line: str) -> str:
+    """JSON of a value in Python's own types, where `line` breaks to its indentation."""
+    inner = line + "  "
+    if isinstance(value, dict) and value:
+        items = (f"{_text(key, inner)}: {_text(value[key], inner)}" for key in sorted(value))
+        return "{" + inner + f",{inner}".join(items) + line + "}"
+    if isinstance(value, list) and any(isinstance(item, (dict, list)) for item in value):
+        return "[" + inner + f",{inner}".join(_text(item, inner) for item in value) + line + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _plain(value: Any, key: str, file: str) -> Any:
