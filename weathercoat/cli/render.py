@@ -35,9 +35,8 @@ def command(run: Path, output: Path, step: int | None, overwrite: bool, **view: 
     from weathercoat.output.pictures import write_png
 
     with whole_file(output, overwrite=overwrite) as stream:
-        write_png(
-            stream, _draw(run, step, {name: value for name, value in view.items() if value is not None})
-        )
+        image = _draw(run, step, {name: value for name, value in view.items() if value is not None})
+        write_png(stream, image)  # type: ignore[arg-type]
     click.echo(f"written to {output}")
 
 

@@ -249,7 +249,8 @@ def _explain(detail: Any) -> tuple[KeyPath, str]:
         )
     for name, word in (("gt", "above"), ("ge", "at least"), ("lt", "below"), ("le", "at most")):
         if name in limits:
-            return path, f"must be {word} {limits[name]:,.15g}, not {shown}"
+            limit = limits[name]
+            return path, f"must be {word} {limit:{',' if isinstance(limit, int) else ',.15g'}}, not {shown}"
     words = {
         "model_type": "must be off or a mapping" if path == ("remesh",) else "must be a mapping",
         "bool_parsing": "must be true or false",
@@ -258,7 +259,6 @@ def _explain(detail: Any) -> tuple[KeyPath, str]:
         "int_type": "must be a whole number",
         "int_parsing_size": "is too large",
         "float_type": "must be a number",
-        "finite_number": "must be a finite number",
         "string_type": "must be text, put it in quotes",
         "tuple_type": "must be a list",
         "too_short": "must not be empty",

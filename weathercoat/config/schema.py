@@ -30,10 +30,12 @@ VERSION = 1
 LARGEST_SEED = 2**63 - 1
 
 
-def _refuse_text_and_bool(value: object) -> object:
+def _require_number(value: object) -> object:
     """Pydantic would read true as 1 and "3" as 3; a config that says so is a mistake."""
     if isinstance(value, bool | str):
         raise ValueError("must be a number")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("must be a finite number")
     return value
 
 
@@ -75,8 +77,8 @@ def _remesh_tag(value: object) -> str:
 
 
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
-Real = Annotated[float, BeforeValidator(_refuse_text_and_bool), Field(allow_inf_nan=False)]
-Whole = Annotated[int, BeforeValidator(_refuse_text_and_bool)]
+Real = Annotated[float, BeforeValidator(_require_number)]
+Whole = Annotated[int, BeforeValidator(_require_number)]
 Names = Annotated[
     tuple[str, ...],
     BeforeValidator(_at_least_one_word),
@@ -328,10 +330,10 @@ class Appearance(Section):
 class Snapshots(Section):
     """When film and metal are recorded: a number of times, or explicit steps."""
 
-    count: Annotated[int, Field(ge=1, le=100_000), BeforeValidator(_refuse_text_and_bool)] | None = parameter(
+    count: Annotated[int, Field(ge=1, le=100_000), BeforeValidator(_require_number)] | None = parameter(
         5, "Number of snapshots, evenly spaced over the run and ending with it; not together with steps"
     )
-    steps: tuple[Annotated[int, Field(ge=0), BeforeValidator(_refuse_text_and_bool)], ...] = parameter(
+    steps: tuple[Annotated[int, Field(ge=0), BeforeValidator(_require_number)], ...] = parameter(
         (), "The steps to record instead, in rising order; 0 is the start"
     )
 
