@@ -57,10 +57,7 @@ def test_awkward_values_load_back(tmp_path: Path) -> None:
 
 def test_resolved_values_name_their_origins(tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
-    file.write_text("preset: literal
-adhesion:
-  amplitude: 0.25
-")
+    file.write_text("preset: literal\nadhesion:\n  amplitude: 0.25\n")
     lines = resolved_yaml(load_config(file, ["seed=3"])).splitlines()
     assert any(line.startswith("seed: 3 ") and line.endswith("# --set") for line in lines)
     assert any(line.startswith("  amplitude: 0.25 ") and line.endswith("c.yaml:3") for line in lines)
