@@ -17,7 +17,9 @@ def morton_codes(points: Vectors) -> NDArray[np.uint64]:
     """Position of each of the points (n, 3) along the Morton curve through their bounding cube, 21 bits an axis."""
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max()) or 1.0
-    cell = np.minimum(((points - low) / extent * 2**21).astype(np.uint64), np.uint64(2**21 - 1))
+    # rounded, not floored: grids and symmetric shapes have vertices on the bounds of halves, quarters and so on, where a
+    # last bit would decide
+    cell = np.minimum(np.rint((points - low) / extent * 2**21).astype(np.uint64), np.uint64(2**21 - 1))
     code = np.zeros(len(points), np.uint64)
     for axis in range(3):
         bits = cell[:, axis]
