@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.surface import Surface, Vectors
 
 _DISTINCT = 1e-3  # relative difference of the principal moments, and skewness, below which a shape counts as symmetric
@@ -43,7 +44,8 @@ class Frame:
 
 
 def make_frame(surface: Surface) -> Frame:
-    """The frame of a surface with an area, by its `up`."""
+    """The frame of a surface with an area, by its `up`; bit for bit the same however the surface is numbered."""
+    surface, _ = order_surface(surface, surface.vertices)
     corners = surface.vertices[surface.faces]
     areas = surface.face_areas()
     weight = areas / areas.sum()
