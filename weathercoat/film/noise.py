@@ -16,6 +16,7 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Vectors
 
 _QUANTUM = 1e-6
+_SHIFT = 0.381966  # of a quantum, so that the simple fractions where grids have their vertices are not on its bounds
 
 # The permutation of Perlin's reference implementation of improved noise, 2002.
 PERMUTATION = np.array(
@@ -40,7 +41,7 @@ def stream_key(seed: int, name: str) -> np.uint64:
 def hash_uniform(points: Vectors, key: np.uint64) -> Vectors:
     """A number in [0, 1) for each of the points (n, 3), given in sizes."""
     out = np.empty(len(points))
-    _hash_points(np.round(points / _QUANTUM).astype(np.int64).view(np.uint64), key, out)
+    _hash_points(np.floor(points / _QUANTUM + _SHIFT).astype(np.int64).view(np.uint64), key, out)
     return out
 
 
