@@ -116,10 +116,12 @@ def _make_surface(
 
         data, name = unpack_model(data, MAX_BYTES)
         return _make_surface(data, None, name, None, up, max_faces)
-    polygons = _parse(data, kind, path)
-    polygons.notes[:0] = notes
     axis = up or _AXES[UP_OF_FORMAT.get(kind, _UP_OF_OTHERS)]
-    return repair(polygons, up=axis, name=Path(name).stem, format=kind, max_faces=max_faces)
+    # Numbers that are not finite, or too large, are found and reported by the checks, not by NumPy.
+    with np.errstate(invalid="ignore", over="ignore"):
+        polygons = _parse(data, kind, path)
+        polygons.notes[:0] = notes
+        return repair(polygons, up=axis, name=Path(name).stem, format=kind, max_faces=max_faces)
 
 
 def _parse(data: bytes, kind: str, path: Path | None) -> Polygons:

@@ -66,6 +66,8 @@ def repair(
     referenced = np.zeros(len(polygons.positions), bool)
     referenced[polygons.corners] = True
     notes += _drop_nonfinite(polygons)
+    if not len(polygons.corners):
+        raise NoAreaError("no face has a corner")
     check_precision(polygons.positions[polygons.corners], polygons.single_precision)
 
     triangles, polygon = triangulate(polygons.positions, polygons.corners, polygons.sizes)
@@ -256,32 +258,35 @@ def make_oriented_manifold(
     each vertex, and notes on all of this and on boundaries, components and soup.
     """
     twin, crowded = topology.match_twins(vertices, faces)
-    orientation = topology.orient(vertices, faces, twin)
-    flipped = orientation.flipped
-    split, parent = topology.split_vertices(len(vertices), faces, orientation.twin)
-    boundary = int((orientation.twin < 0).sum())
-    loops = topology.count_boundary_loops(split, orientation.twin)
-    split[flipped] = split[flipped][:, [0, 2, 1]]
-    component_size = np.bincount(orientation.component)
-    inverted = np.bincount(orientation.component, flipped) == component_size
+    first = topology.orient(vertices, faces, twin)
+    split, parent = topology.separate(len(vertices), faces, first.twin, first.flipped)
+    # Cuts that turned out to separate nothing are closed again in the final twins, which may close a component.
+    final_twin, _ = topology.match_twins(vertices[parent], split)
+    final = topology.orient(vertices[parent], split, final_twin)
+    boundary = int((final_twin < 0).sum())
+    loops = topology.count_boundary_loops(split, final_twin)
+    split[final.flipped] = split[final.flipped][:, [0, 2, 1]]
+    flipped = first.flipped ^ final.flipped
+    component_size = np.bincount(final.component)
+    inverted = np.bincount(final.component, flipped) == component_size
     faces_inverted = int(component_size[inverted].sum())
     faces_flipped = int(flipped.sum()) - faces_inverted
 
     at_cut = np.zeros(len(vertices), bool)
-    opened = np.flatnonzero((twin >= 0) & (orientation.twin < 0))
+    opened = np.flatnonzero((twin >= 0) & (first.twin < 0))
     for h in (crowded, opened):
         at_cut[faces[h // 3, h % 3]] = True
         at_cut[faces[h // 3, (h % 3 + 1) % 3]] = True
     pinched = np.unique(parent[len(vertices) :])
     pinched = pinched[~at_cut[pinched]]
 
-    alone = int((orientation.twin.reshape(-1, 3) < 0).all(axis=1).sum())
+    alone = int((final_twin.reshape(-1, 3) < 0).all(axis=1).sum())
     is_soup = len(faces) >= MIN_SOUP_FACES and alone > SOUP_SHARE * len(faces)
-    cut = f"components have no two sides and were cut along {orientation.cut} edges"
+    cut = f"components have no two sides and were cut along {first.cut} edges"
     found = (
         ("W-NONMANIFOLD", len(crowded), "edges of more than two faces were split"),
         ("W-NONMANIFOLD-VERTEX", len(pinched), "vertices where fans of faces only touch were split"),
-        ("W-NONORIENTABLE", orientation.components_cut, cut),
+        ("W-NONORIENTABLE", first.components_cut, cut),
         ("W-FLIPPED", faces_flipped, "faces were turned to agree with their neighbours"),
         ("W-INVERTED", faces_inverted, "faces of components that were inside out were turned"),
         ("W-BOUNDARY", boundary, f"boundary edges in {loops} loops"),
@@ -374,7 +379,7 @@ def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-unty
         if shortest <= MAX_NEEDLE_RATIO**2 * longest:
             continue
         t = twin[3 * f + i]
-        p, q, b = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
+        p, b = faces[f, i], faces[f, (i + 2) % 3]
         if t < 0 or t // 3 == f or faces[t // 3, (t % 3 + 2) % 3] == b or position > budget:
             _detach(faces, twin, f)
             continue

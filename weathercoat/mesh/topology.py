@@ -118,6 +118,38 @@ def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, 
     return number[fan].reshape(-1, 3).astype(np.int32), parent
 
 
+def separate(vertex_count: int, faces: Faces, twin: Ints, flipped: NDArray[np.bool_]) -> tuple[Faces, Ints]:
+    """Split vertices until no directed edge of the faces, turned where `flipped`, occurs twice.
+
+    Cutting an edge is not enough where the fans at both of its ends still hold together around it: such an edge is opened
+    for all of its faces, and where even that leaves two faces on one side of it, all but the first are set apart.
+    Returns the faces, turned, and the old vertex of each new one. Then every edge has at most two faces, which agree, and
+    every vertex one fan.
+    """
+    twin = twin.copy()
+    while True:
+        split, parent = split_vertices(vertex_count, faces, twin)
+        split[flipped] = split[flipped][:, [0, 2, 1]]
+        # Half-edge i of a turned face is half-edge 2 - i of the face as it was.
+        tail = split.astype(np.int64)
+        head = np.roll(tail, -1, axis=1)
+        directed = tail * len(parent) + head
+        directed[flipped] = directed[flipped][:, ::-1]
+        directed = directed.ravel()
+        order = np.argsort(directed, kind="stable")
+        again = order[1:][directed[order][1:] == directed[order][:-1]]
+        if not len(again):
+            return split, parent
+        reverse = directed % len(parent) * len(parent) + directed // len(parent)
+        clash = np.isin(directed, directed[again]) | np.isin(reverse, directed[again])
+        opened = np.flatnonzero(clash & (twin >= 0))
+        if not len(opened):
+            opened = (3 * (again // 3)[:, None] + np.arange(3)).ravel()
+            opened = opened[twin[opened] >= 0]
+        twin[twin[opened]] = -1
+        twin[opened] = -1
+
+
 def count_boundary_loops(faces: Faces, twin: Ints) -> int:
     """The number of closed chains of boundary edges, in faces whose vertices have one fan each."""
     boundary = np.flatnonzero(twin < 0)

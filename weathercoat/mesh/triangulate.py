@@ -1,4 +1,4 @@
-"""Polygons to triangles: quads by the right diagonal, larger ones by ear clipping, concave ones included.
+"""Polygons to triangles, concave ones included: small ones as fans where that is right, all others by ear clipping.
 
 Source of ear clipping: Meisters, Polygons have ears, American Mathematical Monthly 82, 1975.
 """
@@ -10,77 +10,78 @@ from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 
+# Up to here a fan has no slivers to speak of; and a fan from the first corner is what other programs show.
+MAX_FAN = 8
+
 
 def triangulate(
     positions: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles of polygons: (t, 3) indices into `corners` (so that data per corner follow), and (t,) the polygon of each.
+    """Triangles of polygons, (t, 3) as indices into `corners`, so that data per corner follow; (t,) the polygon of each.
 
-    positions: (n, 3), finite where used; corners: (k,) vertex of each corner; sizes: (m,) corners of each polygon. Polygons
-    of fewer than three corners give none. Triangles keep the order and the orientation of the polygons.
+    positions: (n, 3), finite where used; corners: (k,) vertex of each corner; sizes: (m,) corners of each polygon.
+    Polygons of fewer than three corners give none. Triangles keep the order and the orientation of the polygons.
     """
     first = np.cumsum(sizes) - sizes
     count = np.maximum(sizes - 2, 0)
     polygon = np.repeat(np.arange(len(sizes)), count)
     triangles = np.empty((len(polygon), 3), np.int64)
     begin = np.cumsum(count) - count
-    three = np.flatnonzero(sizes == 3)
-    triangles[begin[three]] = first[three, None] + np.arange(3)
-    four = np.flatnonzero(sizes == 4)
-    if len(four):
-        triangles[begin[four, None] + np.arange(2)] = _split_quads(positions, corners, first[four])
-    more = np.flatnonzero(sizes > 4)
-    if len(more):
-        _clip_polygons(positions, corners, first[more], sizes[more], begin[more], triangles)
+    fanned = sizes <= 3
+    for n in range(3, MAX_FAN + 1):
+        chosen = np.flatnonzero(sizes == n)
+        steps = np.arange(n - 2)
+        fan = np.stack([np.zeros(n - 2, np.int64), steps + 1, steps + 2], axis=1)
+        triangles[begin[chosen, None] + steps] = first[chosen, None, None] + fan
+        if n > 3:
+            fanned[chosen] = _is_fan(positions[corners[first[chosen, None] + np.arange(n)]])
+    rest = np.flatnonzero(~fanned)
+    if len(rest):
+        longest = int(sizes[rest].max())
+        _clip_polygons(positions, corners, first[rest], sizes[rest], begin[rest], longest, triangles)
     return triangles, polygon
 
 
-def _split_quads(
-    positions: NDArray[np.float64], corners: NDArray[np.int64], first: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Two triangles (q, 2, 3) a quad: by the diagonal 0-2, or 1-3 where only that one lies inside."""
-    p = positions[corners[first[:, None] + np.arange(4)]]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-
-    def along(a: int, b: int, c: int) -> NDArray[np.float64]:
-        return np.einsum("ij,ij->i", np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a]), normal)  # type: ignore[no-any-return]
-
-    other = (np.minimum(along(0, 1, 2), along(0, 2, 3)) <= 0) & (
-        np.minimum(along(0, 1, 3), along(1, 2, 3)) > 0
-    )
-    pattern = np.where(other[:, None, None], [[0, 1, 3], [1, 2, 3]], [[0, 1, 2], [0, 2, 3]])
-    return first[:, None, None] + pattern
+def _is_fan(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether all triangles between the first corner and an edge have the orientation of the polygon; points (q, n, 3)."""
+    arm = points[:, 1:] - points[:, :1]
+    normals = np.cross(arm[:, :-1], arm[:, 1:])
+    along = np.einsum("qij,qj->qi", normals, normals.sum(axis=1))
+    return (along > 0).all(axis=1)  # type: ignore[no-any-return]
 
 
-def _clip_polygons(
-    positions: NDArray[np.float64],
-    corners: NDArray[np.int64],
-    first: NDArray[np.int64],
-    sizes: NDArray[np.int64],
-    begin: NDArray[np.int64],
-    triangles: NDArray[np.int64],
-) -> None:
-    for f, n, b in zip(first.tolist(), sizes.tolist(), begin.tolist(), strict=True):
-        flat = _flatten(positions[corners[f : f + n]])
-        _clip_ears(flat, triangles[b : b + n - 2])
-        triangles[b : b + n - 2] += f
+@kernel
+def _clip_polygons(positions, corners, first, sizes, begin, longest, triangles):  # type: ignore[no-untyped-def]
+    flat = np.empty((longest, 2))
+    for q in range(len(first)):
+        n = sizes[q]
+        _flatten(positions, corners[first[q] : first[q] + n], flat)
+        part = triangles[begin[q] : begin[q] + n - 2]
+        _clip_ears(flat[:n], part)
+        part += first[q]
 
 
-def _flatten(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The polygon (n, 3) in its mean plane, (n, 2), counter-clockwise.
+@kernel
+def _flatten(positions, corners, flat):  # type: ignore[no-untyped-def]
+    """The polygon seen along the axis nearest to its normal, counter-clockwise, into `flat` (n, 2).
 
     Source of the normal: Newell's method (Sutherland, Sproull and Schumacker, 1974).
     """
-    points = points - points.mean(axis=0)
-    after = np.roll(points, -1, axis=0)
-    normal = np.cross(points, after).sum(axis=0)
-    length = np.linalg.norm(normal)
-    normal = normal / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    u = np.zeros(3)
-    u[np.argmin(np.abs(normal))] = 1.0
-    u = np.cross(normal, u)
-    u /= np.linalg.norm(u)
-    return np.ascontiguousarray(np.stack([points @ u, points @ np.cross(normal, u)], axis=1))
+    normal = np.zeros(3)
+    origin = positions[corners[0]]
+    for i in range(len(corners)):
+        p = positions[corners[i]] - origin
+        q = positions[corners[(i + 1) % len(corners)]] - origin
+        normal[0] += p[1] * q[2] - p[2] * q[1]
+        normal[1] += p[2] * q[0] - p[0] * q[2]
+        normal[2] += p[0] * q[1] - p[1] * q[0]
+    axis = np.argmax(np.abs(normal))
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    if normal[axis] < 0:
+        u, v = v, u
+    for i in range(len(corners)):
+        flat[i, 0] = positions[corners[i], u] - origin[u]
+        flat[i, 1] = positions[corners[i], v] - origin[v]
 
 
 @kernel
@@ -90,15 +91,14 @@ def _turn(p, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _is_ear(p, previous, following, reflex, a, b, c):  # type: ignore[no-untyped-def]
+def _is_ear(p, following, reflex, a, b, c):  # type: ignore[no-untyped-def]
     """Whether no reflex corner of the rest lies in the triangle a, b, c, except at its corners."""
     i = following[c]
     while i != a:
         if reflex[i]:
             at_corner = False
             for j in (a, b, c):
-                if p[i, 0] == p[j, 0] and p[i, 1] == p[j, 1]:
-                    at_corner = True
+                at_corner = at_corner or (p[i, 0] == p[j, 0] and p[i, 1] == p[j, 1])
             if not at_corner and _turn(p, a, b, i) >= 0 and _turn(p, b, c, i) >= 0 and _turn(p, c, a, i) >= 0:
                 return False
         i = following[i]
@@ -107,7 +107,7 @@ def _is_ear(p, previous, following, reflex, a, b, c):  # type: ignore[no-untyped
 
 @kernel
 def _clip_ears(p, triangles):  # type: ignore[no-untyped-def]
-    """Triangles (n - 2, 3) of the polygon `p` (n, 2); where nothing is an ear (self-crossing), the next corner is cut off."""
+    """Triangles (n - 2, 3) of the polygon `p` (n, 2); where no corner is an ear (self-crossing), the next is cut off."""
     n = len(p)
     previous = np.arange(-1, n - 1)
     previous[0] = n - 1
@@ -122,11 +122,9 @@ def _clip_ears(p, triangles):  # type: ignore[no-untyped-def]
     done = 0
     tried = 0
     while done < n - 2:
-        a = previous[b]
-        c = following[b]
-        left = n - done
-        ear = not reflex[b] and (reflexes == 0 or _is_ear(p, previous, following, reflex, a, b, c))
-        if not ear and tried < left:
+        a, c = previous[b], following[b]
+        ear = not reflex[b] and (reflexes == 0 or _is_ear(p, following, reflex, a, b, c))
+        if not ear and tried < n - done:
             b = c
             tried += 1
             continue

@@ -39,7 +39,7 @@ def read_off(data: bytes) -> Polygons:
     if not len(filled) or not 2 <= lines.fields[filled[0]] <= 3:
         raise CorruptError("the line with the counts of vertices, faces and edges is missing")
     counts = lines.numbers(filled[:1])
-    if not np.all((counts >= 0) & (counts == np.floor(counts))):
+    if not np.all((counts >= 0) & (counts < 2**53) & (counts == np.floor(counts))):
         raise CorruptError(f"line {lines.number[filled[0]]}: counts are whole numbers from 0 on")
     vertex_count, face_count = int(counts[0]), int(counts[1])
     rows = filled[1:]
