@@ -22,6 +22,8 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.dihedral import bend_gradient
 from weathercoat.mesh.surface import Indices, Vectors
 
+_LEAST_LEVERAGE = 0.05  # least sum of w |gradient|^2 that a correction counts with, relative to both apexes moving
+
 
 @kernel
 def project_dihedrals(
@@ -73,8 +75,8 @@ def project_dihedrals(
             + w3 * ee / mm
             + w4 * ee / nn
         )
-        if not total > 0.0:
-            continue
+        # where only points may move that hardly turn the faces, an exact correction would throw them far
+        total = max(total, _LEAST_LEVERAGE * (ee / mm + ee / nn))
         scale = stiffness * error / total
         positions[p1, 0] -= w1 * scale * g1x
         positions[p1, 1] -= w1 * scale * g1y
@@ -108,8 +110,9 @@ def project_split_angles(
             continue
         ax, ay, az = ax / a_norm, ay / a_norm, az / a_norm
         half = 0.5 * (math.pi + target[i])
-        _turn_face(positions, inverse_mass, p1, p2, p3, ax, ay, az, half, stiffness)
-        _turn_face(positions, inverse_mass, p2, p1, p4, ax, ay, az, half, stiffness)
+        reach = min(m_norm, n_norm) / length
+        _turn_face(positions, inverse_mass, p1, p2, p3, ax, ay, az, half, reach, stiffness)
+        _turn_face(positions, inverse_mass, p2, p1, p4, ax, ay, az, half, reach, stiffness)
 
 
 @kernel
@@ -151,9 +154,14 @@ def _turn_face(
     ay: float,
     az: float,
     half: float,
+    reach: float,
     stiffness: float,
 ) -> None:
-    """Bring the angle between the constant direction a, normal to the edge, and the face p1, p2, p3 to `half`."""
+    """Bring the angle between the constant direction a, normal to the edge, and the face p1, p2, p3 to `half`.
+
+    The apex is moved as if its height over the edge were at most `reach`, that of the lower of the two faces: the full step
+    of a high face moves the edge so far that a low one beside it turns by more than was gained, which diverges.
+    """
     ex, ey, ez, length = _edge(positions, p1, p2)
     mx, my, mz, norm = _normal(positions, p1, p2, p3)
     if not norm > 0.0:
@@ -161,17 +169,14 @@ def _turn_face(
     ux, uy, uz = my * ez - mz * ey, mz * ex - mx * ez, mx * ey - my * ex
     cx, cy, cz = ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux
     angle = math.atan2(math.sqrt(cx * cx + cy * cy + cz * cz), ax * ux + ay * uy + az * uz)
-    height = norm / length
     px = positions[p3, 0] - positions[p1, 0]
     py = positions[p3, 1] - positions[p1, 1]
     pz = positions[p3, 2] - positions[p1, 2]
     share = (px * ex + py * ey + pz * ez) / length
     w1, w2, w3 = inverse_mass[p1], inverse_mass[p2], inverse_mass[p3]
     total = w1 * (1.0 - share) ** 2 + w2 * share**2 + w3
-    if not total > 0.0:
-        return
     # the angle's gradient is -m / height at p3, and its reaction at the edge
-    scale = stiffness * (angle - half) * height / total
+    scale = stiffness * min(max(angle - half, -1.0), 1.0) * min(norm / length, reach) / max(total, _LEAST_LEVERAGE)
     for axis, m in ((0, mx), (1, my), (2, mz)):
         positions[p3, axis] += w3 * scale * m
         positions[p1, axis] -= w1 * scale * (1.0 - share) * m
@@ -193,9 +198,9 @@ def project_arccos_angles(
         total = 0.0
         for k in range(4):
             total += inverse_mass[p[k]] * np.dot(gradient[k], gradient[k])
-        if not total > 0.0:
-            continue
-        scale = stiffness * error / total * (-1.0 if bend > 0.0 else 1.0)
+        apexes = np.dot(gradient[2], gradient[2]) + np.dot(gradient[3], gradient[3])
+        error = min(max(error, -1.0), 1.0)
+        scale = stiffness * error / max(total, _LEAST_LEVERAGE * apexes) * (-1.0 if bend > 0.0 else 1.0)
         for k in range(4):
             for axis in range(3):
                 positions[p[k], axis] -= inverse_mass[p[k]] * scale * gradient[k, axis]

@@ -32,8 +32,8 @@ class DeformParameters:
     """
 
     curl_rule: str = "curvature"  # or "angle"
-    curl_radius: float = 0.08
-    curl_rate: float = 4.0
+    curl_radius: float = 0.05
+    curl_rate: float = 10.0
     curl_angle_rate: float = 0.8
     curl_angle_floor: float = 2.6
     deformation_sweeps: int = 10

@@ -32,16 +32,16 @@ class FilmParameters:
     tension_initial: float = 0.0
     tension_rate: float = 3.0
     adhesion_base: float = 1.0
-    adhesion_amplitude: float = 0.5
-    adhesion_wavelength: float = 0.25
-    adhesion_octaves: int = 3
-    adhesion_gain: float = 0.5
-    adhesion_decay_rate: float = 1.0
+    adhesion_amplitude: float = 0.8
+    adhesion_wavelength: float = 0.3
+    adhesion_octaves: int = 4
+    adhesion_gain: float = 0.65
+    adhesion_decay_rate: float = 0.5
     cohesion_base: float = 1.5
     cohesion_scatter: float = 0.2
     cohesion_decay_rate: float = 0.3
     defects_rule: str = "per_area"  # or "share"
-    defects_density: float = 100.0
+    defects_density: float = 400.0
     defects_share: float = 0.01
     defects_strength: float = 0.001
     lift_coefficient: float = 0.3
@@ -56,7 +56,7 @@ class FilmParameters:
     fracture_rounds: str = "by_speed"  # or "one"
     fracture_speed: float = 20.0
     flaking_rule: str = "islands"  # or "faces"
-    flaking_hanging_share: float = 0.05
+    flaking_hanging_share: float = 0.08
 
 
 class FilmRules(NamedTuple):
