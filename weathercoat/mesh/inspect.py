@@ -1,4 +1,4 @@
-"""What `weathercoat inspect` tells about a surface: sizes, topology, sharp edges, groups, self-intersections."""
+"""What `weathercoat inspect` tells of a surface: sizes, topology, sharp edges, groups, self-intersections."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ MAX_CELLS_PER_FACE = 8
 
 
 def inspect_surface(surface: Surface, *, self_intersections: bool = False) -> dict[str, Any]:
-    """Counts and measures of a surface as plain numbers, lists and strings, ready for JSON. Lengths in the model's units.
+    """Counts and measures of a surface, ready for JSON; lengths in the model's units.
 
-    Edges are sharp where the normals of their two faces differ by more than 30 degrees. With `self_intersections`, which
-    takes several times as long as reading, the notes include W-SELFINT with the number of faces that cut through others.
+    Edges are sharp where the normals of their two faces differ by more than 30 degrees. With
+    `self_intersections`, which takes several times as long as reading, the notes include W-SELFINT with the
+    number of faces that cut through others.
     """
     vertices, faces = surface.vertices, surface.faces
     twin, crowded = topology.match_twins(vertices, faces)
@@ -96,8 +97,9 @@ def _sharp_share(vertices: NDArray[np.float64], faces: NDArray[np.int32], twin: 
 def self_intersecting_faces(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Whether each face, (m,), cuts another or is cut by it.
 
-    Two faces cut each other where an edge of one passes through the inside of the other; faces that share an edge, only
-    touch, or overlap in one plane do not count. A grid of cells about as large as the faces finds the candidates.
+    Two faces cut each other where an edge of one passes through the inside of the other; faces that share
+    an edge, only touch, or overlap in one plane do not count. A grid of cells about as large as the faces
+    finds the candidates.
     """
     corner = vertices[faces]
     low, high = corner.min(axis=1), corner.max(axis=1)
@@ -137,7 +139,7 @@ def _enter_cells(first, last, shape, key, member):  # type: ignore[no-untyped-de
 
 @kernel
 def _test_cells(corner, position, low, high, first, key, member, shape, hit):  # type: ignore[no-untyped-def]
-    """Mark the faces that cut another of the same cell; each pair is tested in the first cell that both cover."""
+    """Mark the faces that cut another of their cell; a pair is tested in the first cell that both cover."""
     begin = 0
     while begin < len(key):
         end = begin + 1
@@ -173,10 +175,10 @@ def _test_cells(corner, position, low, high, first, key, member, shape, hit):  #
 
 @kernel
 def _cuts(a, b, shared):  # type: ignore[no-untyped-def]
-    """Whether an edge of triangle `a` (3, 3) passes through triangle `b`; not the edges at the corner `shared` (or -1).
+    """Whether an edge of triangle `a` (3, 3), but none at its corner `shared` (or -1), passes through `b`.
 
-    The ends of the edge must lie on different sides of the plane, and its line pass the three edges of `b` on the same side;
-    each is the sign of a volume.
+    The ends of the edge must lie on different sides of the plane, and its line pass the three edges of `b`
+    on the same side; each is the sign of a volume.
     """
     normal = cross(b[1] - b[0], b[2] - b[0])
     height = np.empty(3)

@@ -1,12 +1,11 @@
 """Reading a model: from a file or a stream to a repaired `Surface`.
 
-The content decides the format, the extension only where the content does not tell. Nothing outside the model's folder
-is read, and nothing from the network.
+The content decides the format, the extension only where the content does not tell. Nothing outside the
+model's folder is read, and nothing from the network.
 """
 
 from __future__ import annotations
 
-import os
 import stat
 from pathlib import Path
 from typing import BinaryIO
@@ -44,12 +43,13 @@ def read_surface(
 ) -> Surface:
     """Read a model, weld and repair it, ready for remeshing.
 
-    format: overrules content and extension ("obj", "ply", "stl", "off", "glb", "gltf", or an extension that meshio knows).
+    format: overrules content and extension: obj, ply, stl, off, glb, gltf, or an extension that meshio knows.
     up: "auto" follows the format (glTF and OBJ +y, all others +z), else x, y, z, -x, -y, -z or a vector.
     max_faces: triangles beyond which the model is refused.
 
-    Errors: AccessError, EmptyFileError, FormatError, CorruptError, MissingFileError, SecurityError, UnsupportedError;
-    NoFacesError, NoAreaError, NonFiniteError, PrecisionError, ScaleError; LimitError; each with the file's name.
+    Errors: AccessError, EmptyFileError, FormatError, CorruptError, MissingFileError, SecurityError,
+    UnsupportedError; NoFacesError, NoAreaError, NonFiniteError, PrecisionError, ScaleError; LimitError;
+    each with the file's name.
     """
     path = Path(path)
     direction = _direction(up)
@@ -79,7 +79,7 @@ def read_stream(
 def _load(path: Path) -> bytes:
     """The bytes of a regular file; refuses everything else at once."""
     try:
-        status = os.stat(path)
+        status = path.stat()
         if stat.S_ISDIR(status.st_mode):
             raise AccessError("is a directory")
         if not stat.S_ISREG(status.st_mode):

@@ -1,7 +1,8 @@
-"""From the polygons of a file to a triangle surface that is an oriented manifold, with a note for each repair.
+"""From the polygons of a file to an oriented manifold of triangles, with a note for each repair.
 
-The order: triangles, weld, faces without area, duplicates, twins, orientation, split vertices. Everything is linear in the
-faces or sorts them. Nothing is filled, moved or invented: positions of the result are positions of the file.
+The order: triangles, weld, faces without area, duplicates, twins, orientation, split vertices. Everything
+is linear in the faces or sorts them. Nothing is filled, moved or invented: positions of the result are
+positions of the file.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ Indices = NDArray[np.int64]
 SINGLE = 2.0**-23
 # A shape is refused where its coordinates resolve less than a thousandth of its diagonal.
 MIN_RESOLUTION = 1e-3
-# Between these diagonals, faces of a millionth of the size have areas that float32, in which results are written, can hold.
+# Between these diagonals, faces of a millionth of the size have areas that float32, in which results are
+# written, can hold.
 MIN_DIAGONAL, MAX_DIAGONAL = 1e-13, 1e13
 # Height of a triangle over its longest edge below which it has no area: the rounding of float32 positions.
 MIN_HEIGHT = SINGLE
@@ -49,7 +51,7 @@ MIN_SOUP_FACES = 10
 def repair(
     polygons: Polygons, *, up: tuple[float, float, float], name: str, format: str, max_faces: int
 ) -> Surface:
-    """The surface of `polygons`: triangles, welded, oriented, every edge of at most two faces, every vertex of one fan.
+    """The surface of `polygons`: welded, oriented, at most two faces at an edge, one fan at a vertex.
 
     Errors: NoFacesError, NonFiniteError, PrecisionError, ScaleError, NoAreaError, LimitError.
     """
@@ -133,24 +135,25 @@ def check_precision(points: Points, single_precision: bool) -> None:
         raise NoAreaError("all vertices lie at one point")
     if resolution > MIN_RESOLUTION * diagonal:
         raise PrecisionError(
-            f"coordinates near {largest:.3g} are stored to {resolution:.2g}, but the model is only {diagonal:.3g} across"
+            f"coordinates near {largest:.3g} are stored to {resolution:.2g}, the model is {diagonal:.3g} across"
         )
     if not MIN_DIAGONAL <= diagonal <= MAX_DIAGONAL:
         raise ScaleError(
-            f"the model is {diagonal:.3g} across; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} can be worked with"
+            f"the model is {diagonal:.3g} across; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} are possible"
         )
 
 
 def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tuple[Indices, Indices, int]:
-    """Merge the vertices in use of one `part` (n,) that lie at the same position, up to the rounding of one float32 operation per coordinate.
+    """Merge the vertices in use that lie at the same position and in the same `part` (n,).
 
-    The tolerance is relative, so that no scale, proportion or offset changes what is merged: two coordinates are the same
-    where they differ by 2^-23 of their own magnitude, since most programs round to float32 whatever they write afterwards;
-    on an axis on which the model lies far from the origin, 2^-23 of its extent there instead. It never exceeds a
-    ten-millionth of the model, far below the thickness of any sheet.
+    The tolerance is the rounding of float32, relative, so that no scale, proportion or offset changes what
+    is merged: two coordinates are the same where they differ by 2^-23 of their own magnitude, since most
+    programs round to float32 whatever they write afterwards; on an axis on which the model lies far from
+    the origin, 2^-23 of its extent there instead. It never exceeds 2^-22 of the extent, far below the thickness
+    of any sheet.
 
-    Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file there; and how
-    many vertices were merged away.
+    Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file
+    there; and how many vertices were merged away.
     """
     used, compact = np.unique(corners, return_inverse=True)
     points = np.ascontiguousarray(positions[used])
@@ -158,7 +161,8 @@ def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tu
     extent = high - low
     is_far = np.maximum(np.abs(low), np.abs(high)) > 2.0 * extent
     tolerance = SINGLE * np.where(is_far, extent, np.abs(points))
-    # A lattice on which points within the tolerance are at most two steps apart: of the leading bits, or even.
+    # A lattice on which points within the tolerance are at most two steps apart: of the leading bits, or
+    # even.
     bits = np.abs(points).view(np.int64) >> (52 - 23)
     even = (points - low) / np.where(extent > 0, SINGLE * extent, 1.0)
     lattice = np.where(is_far, even.astype(np.int64), np.where(points < 0, -bits, bits))
@@ -176,10 +180,10 @@ def remove_degenerate(
 ) -> tuple[Faces, NDArray[np.float64], Indices, int]:
     """Remove the faces without area, and leave no crack where they were.
 
-    A face with a repeated vertex is dropped. A needle, two of whose corners all but coincide, is closed by merging them. A cap,
-    one of whose corners lies on the opposite edge, is flipped away with the neighbour across that edge, which so takes in
-    the corner; at a boundary it is dropped.
-    Returns faces, uv, for each face the one whose attributes it has, and how many had no area.
+    A face with a repeated vertex is dropped. A needle, two of whose corners all but coincide, is closed by
+    merging them. A cap, one of whose corners lies on the opposite edge, is flipped away with the neighbour
+    across that edge, which so takes in the corner; at a boundary it is dropped. Returns faces, uv, for each
+    face the one whose attributes it has, and how many had no area.
     """
     source = np.arange(len(faces))
     uv = uv.copy()
@@ -224,14 +228,14 @@ def _edge_ratio(vertices: Points, faces: Faces) -> Points:
 
 
 def _merge_shortest(vertices: Points, faces: Faces, needles: Indices) -> Faces:
-    """Faces with the two ends of the shortest edge of each of `needles` made one vertex, the first of them."""
+    """Faces in which the ends of the shortest edge of each of `needles` are one vertex, the first of them."""
     side = np.argmin(_edge_lengths(vertices, faces[needles]), axis=1)
     ends = np.stack([faces[needles, side], faces[needles, (side + 1) % 3]]).astype(np.int64)
     return topology.merged(len(vertices), ends)[faces].astype(np.int32)
 
 
 def is_flat(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
-    """Whether the corners of each face lie on a line: its height is below `MIN_HEIGHT` of its longest edge."""
+    """Whether the corners of each face lie on a line: height at most `MIN_HEIGHT` of the longest edge."""
     corner = vertices[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     longest = np.max(((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2), axis=1, initial=0.0)
@@ -254,13 +258,14 @@ def make_oriented_manifold(
 ) -> tuple[Faces, NDArray[np.bool_], Indices, list[Note]]:
     """Orient each component, and split edges of more than two faces and vertices of more than one fan.
 
-    Returns the faces, which of them were turned around (their second and third corner are exchanged), the old vertex of
-    each vertex, and notes on all of this and on boundaries, components and soup.
+    Returns the faces, which of them were turned around (their second and third corner are exchanged), the
+    old vertex of each vertex, and notes on all of this and on boundaries, components and soup.
     """
     twin, crowded = topology.match_twins(vertices, faces)
     first = topology.orient(vertices, faces, twin)
     split, parent = topology.separate(len(vertices), faces, first.twin, first.flipped)
-    # Cuts that turned out to separate nothing are closed again in the final twins, which may close a component.
+    # Cuts that turned out to separate nothing are closed again in the final twins, which may close a
+    # component.
     final_twin, _ = topology.match_twins(vertices[parent], split)
     final = topology.orient(vertices[parent], split, final_twin)
     boundary = int((final_twin < 0).sum())
@@ -298,7 +303,7 @@ def make_oriented_manifold(
 
 def _drop_nonfinite(polygons: Polygons) -> list[Note]:
     """Drop the faces that use a position which is not finite."""
-    broken = ~np.isfinite(polygons.positions).all(axis=1)
+    broken: NDArray[np.bool_] = ~np.isfinite(polygons.positions).all(axis=1)
     at_broken = broken[polygons.corners]
     if not at_broken.any():
         return []
@@ -314,9 +319,10 @@ def _drop_nonfinite(polygons: Polygons) -> list[Note]:
 
 @kernel
 def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-untyped-def]
-    """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each point, or the point itself.
+    """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each, or itself.
 
-    Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell holds more than a few.
+    Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell
+    holds more than a few.
     """
     n = len(points)
     size = 16
@@ -357,7 +363,7 @@ def _slot(part, a, b, c, size):  # type: ignore[no-untyped-def]
 
 @kernel
 def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-untyped-def]
-    """Flip the faces `flat` with their neighbours, in place; those that cannot be get the vertex 0 three times.
+    """Flip the faces `flat` with their neighbours, in place; those that cannot be get vertex 0 three times.
 
     Flat faces that this makes are flipped in turn, but needles are left.
     """

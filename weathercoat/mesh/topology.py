@@ -21,8 +21,8 @@ Points = NDArray[np.float64]
 class Orientation:
     """One orientation a component.
 
-    twin: (3 m,) after cutting; component: (m,); flipped: (m,) faces to turn around; cut: edges where a component that
-    cannot be oriented was opened; components_cut: how many components that concerns.
+    twin: (3 m,) after cutting; component: (m,); flipped: (m,) faces to turn around; cut: edges where a
+    component that cannot be oriented was opened; components_cut: how many components that concerns.
     """
 
     twin: Ints
@@ -33,10 +33,11 @@ class Orientation:
 
 
 def match_twins(vertices: Points, faces: Faces) -> tuple[Ints, Ints]:
-    """The half-edge on the other side of each, (3 m,), -1 at a boundary; and one half-edge of each edge of more than two faces.
+    """The half-edge on the other side of each, (3 m,), -1 at a boundary; one half-edge of each crowded edge.
 
-    The faces around such an edge are paired two by two: first those that agree in orientation, the straightest first; what
-    is left over ends there, and so do all faces around an edge of more than 64.
+    Crowded are edges of more than two faces. The faces around one are paired two by two: first those that
+    agree in orientation, the straightest first; what is left over ends there, and so do all faces around an
+    edge of more than 64.
     """
     tail = faces.ravel().astype(np.int64)
     head = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
@@ -57,7 +58,7 @@ def match_twins(vertices: Points, faces: Faces) -> tuple[Ints, Ints]:
 
 
 def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
-    """The same orientation throughout each component: outward where it is closed, else that of the greater area.
+    """One orientation for each component: outward where it is closed, else that of the greater area.
 
     A component that cannot be oriented is cut along the edges where its orientations meet.
     """
@@ -82,7 +83,7 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
     middle = np.stack(
         [np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1
     )
-    middle /= np.bincount(component, minlength=components)[:, None]
+    middle = center / np.bincount(component, minlength=components)[:, None]
     arm = corner.mean(axis=1) - middle[component]
     volume = np.bincount(component, sign * np.einsum("ij,ij->i", arm, normal) / 6.0, components)
     closed = np.bincount(component, (twin.reshape(-1, 3) < 0).any(axis=1), components) == 0
@@ -100,7 +101,8 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
 def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, Ints]:
     """Faces in which every vertex has one fan: corners that no common edge joins get vertices of their own.
 
-    Returns the faces (m, 3) and the old vertex of each new vertex; the first fan of a vertex keeps its number.
+    Returns the faces (m, 3) and the old vertex of each new vertex; the first fan of a vertex keeps its
+    number.
     """
     fan = np.arange(3 * len(faces))
     _join_fans(faces, twin, fan)
@@ -121,10 +123,10 @@ def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, 
 def separate(vertex_count: int, faces: Faces, twin: Ints, flipped: NDArray[np.bool_]) -> tuple[Faces, Ints]:
     """Split vertices until no directed edge of the faces, turned where `flipped`, occurs twice.
 
-    Cutting an edge is not enough where the fans at both of its ends still hold together around it: such an edge is opened
-    for all of its faces, and where even that leaves two faces on one side of it, all but the first are set apart.
-    Returns the faces, turned, and the old vertex of each new one. Then every edge has at most two faces, which agree, and
-    every vertex one fan.
+    Cutting an edge is not enough where the fans at both of its ends still hold together around it: such an
+    edge is opened for all of its faces, and where even that leaves two faces on one side of it, all but the
+    first are set apart. Returns the faces, turned, and the old vertex of each new one. Then every edge has
+    at most two faces, which agree, and every vertex one fan.
     """
     twin = twin.copy()
     while True:
@@ -187,7 +189,7 @@ def cross(a, b):  # type: ignore[no-untyped-def]
 
 @kernel
 def _pair(vertices, faces, order, begin, count, twin):  # type: ignore[no-untyped-def]
-    """Pair the half-edges order[begin : begin + count] around each edge; entries of `twin` are set in place."""
+    """Pair the half-edges order[begin : begin + count] around each edge; sets entries of `twin`."""
     apex = np.empty((64, 3))
     forward = np.empty(64, np.bool_)
     for e in range(len(begin)):
@@ -233,13 +235,13 @@ def _pair(vertices, faces, order, begin, count, twin):  # type: ignore[no-untype
 
 @kernel
 def _agree(faces, h, t):  # type: ignore[no-untyped-def]
-    """Whether the faces of two half-edges of one edge run along it in opposite directions, as neighbours should."""
+    """Whether two half-edges of one edge run in opposite directions, as those of neighbours should."""
     return faces[h // 3, h % 3] != faces[t // 3, t % 3]
 
 
 @kernel
 def _spread_orientation(faces, twin, component, turned, queue):  # type: ignore[no-untyped-def]
-    """Number the components, and mark the faces that are turned against the first face of theirs; breadth first."""
+    """Number the components, and mark the faces turned against the first of theirs; breadth first."""
     components = 0
     for seed in range(len(faces)):
         if component[seed] >= 0:

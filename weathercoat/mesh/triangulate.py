@@ -1,4 +1,4 @@
-"""Polygons to triangles, concave ones included: small ones as fans where that is right, all others by ear clipping.
+"""Polygons to triangles, concave ones included: small ones as fans where that fits, others by ear clipping.
 
 Source of ear clipping: Meisters, Polygons have ears, American Mathematical Monthly 82, 1975.
 """
@@ -17,10 +17,11 @@ MAX_FAN = 8
 def triangulate(
     positions: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles of polygons, (t, 3) as indices into `corners`, so that data per corner follow; (t,) the polygon of each.
+    """Triangles (t, 3) as indices into `corners`, so that data per corner follow; (t,) the polygon of each.
 
-    positions: (n, 3), finite where used; corners: (k,) vertex of each corner; sizes: (m,) corners of each polygon.
-    Polygons of fewer than three corners give none. Triangles keep the order and the orientation of the polygons.
+    positions: (n, 3), finite where used; corners: (k,) vertex of each corner; sizes: (m,) corners of each
+    polygon. Polygons of fewer than three corners give none. Triangles keep the order and the orientation of
+    the polygons.
     """
     first = np.cumsum(sizes) - sizes
     count = np.maximum(sizes - 2, 0)
@@ -43,7 +44,7 @@ def triangulate(
 
 
 def _is_fan(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether all triangles between the first corner and an edge have the orientation of the polygon; points (q, n, 3)."""
+    """Whether the triangles from the first corner to each edge are all oriented as the polygon (q, n, 3)."""
     arm = points[:, 1:] - points[:, :1]
     normals = np.cross(arm[:, :-1], arm[:, 1:])
     along = np.einsum("qij,qj->qi", normals, normals.sum(axis=1))
@@ -107,7 +108,7 @@ def _is_ear(p, following, reflex, a, b, c):  # type: ignore[no-untyped-def]
 
 @kernel
 def _clip_ears(p, triangles):  # type: ignore[no-untyped-def]
-    """Triangles (n - 2, 3) of the polygon `p` (n, 2); where no corner is an ear (self-crossing), the next is cut off."""
+    """Triangles (n - 2, 3) of the polygon `p` (n, 2); without an ear (self-crossing), the next is cut off."""
     n = len(p)
     previous = np.arange(-1, n - 1)
     previous[0] = n - 1

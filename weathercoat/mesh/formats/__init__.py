@@ -1,1 +1,1 @@
-"""One module a format: bytes in, `Polygons` out, every index and count checked against what the file holds."""
+"""One module a format: bytes in, `Polygons` out, every index and count checked against the file."""

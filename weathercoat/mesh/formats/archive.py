@@ -17,8 +17,8 @@ MAX_RATIO = 200
 def unpack_model(data: bytes, max_bytes: int) -> tuple[bytes, str]:
     """The bytes and the name of the only model in a zip archive.
 
-    Errors: FormatError where there is none or more than one, LimitError where it unpacks to more than `max_bytes` or to more
-    than `MAX_RATIO` times its size, CorruptError, UnsupportedError.
+    Errors: FormatError where there is none or more than one, LimitError where it unpacks to more than
+    `max_bytes` or to more than `MAX_RATIO` times its size, CorruptError, UnsupportedError.
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))

@@ -1,7 +1,8 @@
 """glTF 2.0, as JSON with its buffers or as one GLB.
 
-Only what makes a surface is read: nodes with their transforms, triangles, texture coordinates, vertex colours, names of materials.
-Every accessor is checked against its buffer. Buffers lie in the file or beside it, never elsewhere.
+Only what makes a surface is read: nodes with their transforms, triangles, texture coordinates, vertex
+colours, names of materials. Every accessor is checked against its buffer. Buffers lie in the file or beside
+it, never elsewhere.
 Source: Khronos, glTF 2.0 specification, ISO/IEC 12113:2022.
 """
 
@@ -62,7 +63,7 @@ class _Parts:
 
 
 def read_gltf(data: bytes, folder: Path | None) -> Polygons:
-    """The triangles of the default scene, with all transforms applied; where a transform mirrors, faces are turned back.
+    """The triangles of the default scene, with all transforms applied; mirrored faces are turned back.
 
     Errors: CorruptError, UnsupportedError, SecurityError, MissingFileError.
     """
@@ -276,7 +277,7 @@ class _Document:
         buffer = self._buffer(view["buffer"])
         if begin + length > len(buffer):
             raise CorruptError(
-                f"bufferView {view_index} ends at byte {begin + length}, but its buffer has {len(buffer)} bytes"
+                f"bufferView {view_index} ends at byte {begin + length}, its buffer at {len(buffer)}"
             )
         offset = _natural(offset, "byteOffset")
         needed = offset + (stride * (count - 1) + row if count else 0)
@@ -362,7 +363,7 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
 
 
 def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """The local matrix (4, 4) of a node, from its matrix or its translation, rotation (x, y, z, w) and scale."""
+    """The matrix (4, 4) of a node, from its matrix or its translation, rotation (x, y, z, w) and scale."""
     if "matrix" in node:
         return np.array(node["matrix"], np.float64).reshape(4, 4).T
     x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), np.float64)

@@ -1,7 +1,7 @@
 """Wavefront OBJ: polygons with texture coordinates, groups, materials and vertex colours.
 
-Source: Wavefront, Object Files (.obj), appendix B1 of the Advanced Visualizer manual; vertex colours after the position are
-the common extension of MeshLab and others. Free-form curves and surfaces are passed over.
+Source: Wavefront, Object Files (.obj), appendix B1 of the Advanced Visualizer manual; vertex colours after
+the position are the common extension of MeshLab and others. Free-form curves and surfaces are passed over.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.formats.text import Lines, decode_names, join_continued, normalise, pack
 
 PASSED_OVER = (
-    "l p s vp mtllib usemap maplib mg cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con bevel c_interp "
-    "d_interp lod ctech stech call csh bsp bzp cdc cdp res vw"
-).split()
+    "l", "p", "s", "vp", "mtllib", "usemap", "maplib", "mg", "cstype", "deg", "bmat", "step", "curv", "curv2",
+    "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod", "ctech",
+    "stech", "call", "csh", "bsp", "bzp", "cdc", "cdp", "res", "vw",
+)  # fmt: skip
 # Longer than the eight characters that tell keywords apart.
 _LONG = {b"shadow_obj", b"trace_obj"}
-KEYWORDS = (*"v vt vn f fo g o usemtl".split(), *PASSED_OVER)
+KEYWORDS = ("v", "vt", "vn", "f", "fo", "g", "o", "usemtl", *PASSED_OVER)
 
 
 def read_obj(data: bytes, folder: Path | None) -> Polygons:
@@ -83,14 +84,14 @@ def _vertices(lines: Lines, v: NDArray[np.int64]) -> tuple[NDArray[np.float64], 
 def _faces(
     lines: Lines, f: NDArray[np.int64], v: NDArray[np.int64], vt: NDArray[np.int64], vn: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Vertex and texture index of each corner, counted from 0, -1 for the illegal index 0; corners of each face."""
+    """Vertex and texture index of each corner, from 0, -1 for the illegal index 0; corners of each face."""
     sizes = lines.fields[f]
     indices = np.empty((int(sizes.sum()), 3), np.int64)
     before = np.stack([np.searchsorted(kind, f) for kind in (v, vt, vn)], axis=1).astype(np.int64)
     bad = _parse_corners(lines.buffer, lines.begin[f], lines.end[f], before, indices)
     if bad >= 0:
         raise CorruptError(f"line {lines.number[f[bad]]}: {lines.text(f[bad])[:60]!r} is no list of indices")
-    # Indices of normals are not checked: files whose normals were stripped keep them, and nothing here uses them.
+    # Indices of normals are not checked: files whose normals were stripped keep them, and they are not used.
     for column, (kind, name) in enumerate(((v, "vertices"), (vt, "texture coordinates"))):
         outside = np.flatnonzero((indices[:, column] >= len(kind)) | (indices[:, column] == BEFORE_FIRST))
         if len(outside):
@@ -128,7 +129,7 @@ def _groups(lines: Lines, f: NDArray[np.int64]) -> tuple[NDArray[np.int32], tupl
     """A group per face: its material where the file names any, else its group, else its object."""
     for keyword in ("usemtl", "g", "o"):
         switches = np.flatnonzero(lines.keyword == pack(keyword))
-        names = decode_names([b" ".join(lines.text(line).split()) for line in switches])
+        names = decode_names([b" ".join(lines.text(line).split()) for line in switches.tolist()])
         if any(names):
             break
     else:
@@ -151,7 +152,7 @@ def _missing_materials(lines: Lines, folder: Path | None) -> list[Note]:
     if folder is None:
         return []
     missing = []
-    for line in np.flatnonzero(lines.keyword == pack("mtllib")):
+    for line in np.flatnonzero(lines.keyword == pack("mtllib")).tolist():
         (name,) = decode_names([lines.text(line).strip()])
         path = Path(name.replace("\\", "/").removeprefix("./"))
         outside = path.is_absolute() or ".." in path.parts or ":" in name
@@ -175,10 +176,10 @@ BEFORE_FIRST = -3
 
 @kernel
 def _parse_corners(buffer, begin, end, before, indices):  # type: ignore[no-untyped-def]
-    """Indices v/vt/vn of each corner, from 0, into `indices` (k, 3); the first line that is no such list, or -1.
+    """Indices v/vt/vn of each corner, from 0, into `indices` (k, 3); the first line that is no list, or -1.
 
-    Relative (negative) indices count back from the elements `before` the line. -1 stands for the illegal index 0,
-    ABSENT for none, BEFORE_FIRST for a relative index that is too large.
+    Relative (negative) indices count back from the elements `before` the line. -1 stands for the illegal
+    index 0, ABSENT for none, BEFORE_FIRST for a relative index that is too large.
     """
     corner = 0
     for line in range(len(begin)):

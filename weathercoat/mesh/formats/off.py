@@ -45,7 +45,7 @@ def read_off(data: bytes) -> Polygons:
     rows = filled[1:]
     if vertex_count + face_count != len(rows):
         raise CorruptError(
-            f"the header says {vertex_count} vertices and {face_count} faces, the file holds {len(rows)} lines of them"
+            f"the header says {vertex_count} vertices and {face_count} faces, the file {len(rows)} lines"
         )
     before = 3 + 3 * normal
     after = 2 * texture
@@ -67,7 +67,7 @@ def read_off(data: bytes) -> Polygons:
 def _vertices(
     lines: Lines, rows: NDArray[np.int64], before: int, after: int, color: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64] | None]:
-    """Positions, colours and texture coordinates: `before` numbers, a colour of 3 or 4, `after` numbers a line."""
+    """Positions, colours, texture coordinates: `before` numbers, a colour, `after` numbers a line."""
     fields = lines.fields[rows]
     allowed = [before + after + n for n in ((3, 4) if color else (0, 3, 4))]
     wrong = np.flatnonzero(~np.isin(fields, allowed))
@@ -102,7 +102,7 @@ def _faces(lines: Lines, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], ND
 
 @kernel
 def _parse_counted(buffer, begin, end, sizes, corners):  # type: ignore[no-untyped-def]
-    """Lines "count index index ..."; what follows (a colour) is passed over. Corners found, and the first bad line or -1."""
+    """Lines "count index index ...", then perhaps a colour. Corners found, and the first bad line or -1."""
     used = 0
     for line in range(len(begin)):
         i = begin[line]

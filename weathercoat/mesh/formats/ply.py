@@ -1,11 +1,13 @@
 """PLY (polygon file format), text and binary of either byte order.
 
-Source: Turk, The PLY polygon file format, 1994. A text body is taken as rows of float64, so that one walk serves both.
+Source: Turk, The PLY polygon file format, 1994. A text body is taken as rows of float64, so that one walk
+serves both.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,8 @@ _TYPES = {
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
     "double": "f8", "float64": "f8",
 }  # fmt: skip
-_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+ByteOrder = Literal["=", "<", ">"]
+_ORDERS: dict[str, ByteOrder] = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 _MAX_HEADER = 1 << 20
@@ -76,7 +79,7 @@ def read_ply(data: bytes) -> Polygons:
     return polygons
 
 
-def _header(data: bytes) -> tuple[str, list[Element], int]:
+def _header(data: bytes) -> tuple[ByteOrder, list[Element], int]:
     """Byte order, elements, and where the body begins."""
     end = data.find(b"end_header", 0, _MAX_HEADER)
     stop = min((i for i in (data.find(b"\n", end), data.find(b"\r", end)) if i >= 0), default=-1)
@@ -84,7 +87,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
         raise CorruptError("the header has no end")
     body = stop + (2 if data[stop : stop + 2] == b"\r\n" else 1)
     lines = data[:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n").decode("latin-1").split("\n")
-    order = ""
+    order: ByteOrder | None = None
     elements: list[Element] = []
     for number, line in enumerate(lines, 1):
         words = line.split()
@@ -106,7 +109,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int]:
                 raise ValueError
         except (KeyError, IndexError, ValueError):
             raise CorruptError(f"line {number} of the header: {line[:60]!r}") from None
-    if not order:
+    if order is None:
         raise CorruptError("the header names no format")
     return order, elements, body
 
@@ -139,7 +142,7 @@ def _read_ascii(body: bytes, elements: list[Element]) -> dict[str, dict[str, Col
     return table
 
 
-def _read_binary(body: bytes, elements: list[Element], order: str) -> dict[str, dict[str, Column]]:
+def _read_binary(body: bytes, elements: list[Element], order: ByteOrder) -> dict[str, dict[str, Column]]:
     buffer = np.frombuffer(body, np.uint8)
     swap = order not in ("=", "<")
     at = 0
@@ -154,7 +157,7 @@ def _read_binary(body: bytes, elements: list[Element], order: str) -> dict[str, 
         at, whole = _walk(buffer, at, item, count, swap, offsets, sizes)
         if whole < element.count:
             raise CorruptError(
-                f"the header says {element.count} rows of element {element.name}, the file holds {whole} whole ones"
+                f"the header says {element.count} rows of element {element.name}, the file holds {whole}"
             )
         columns = {}
         for i, p in enumerate(element.properties):
@@ -171,12 +174,13 @@ def _check_room(element: Element, least_bytes: int, room: int) -> None:
     """Refuse a count that the file cannot hold before anything is allocated for it."""
     if element.count * least_bytes > room:
         raise CorruptError(
-            f"the header says {element.count} rows of element {element.name}, the file holds at most {room // least_bytes}"
+            f"the header says {element.count} rows of element {element.name}, "
+            f"the file holds at most {room // least_bytes}"
         )
 
 
 def _count_code(count_type: str | None) -> int:
-    """0 for a number, else the bytes of a list's count: negative where signed, 8 for the float64 of a text body."""
+    """0 for a number, else the bytes of a list's count: negative where signed, 8 for float64."""
     if count_type is None:
         return 0
     size = np.dtype(count_type).itemsize
@@ -212,7 +216,7 @@ def _index_column(element: dict[str, Column]) -> Column | None:
 
 
 def strip_triangles(indices: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles (t, 3) of triangle strips; -1 begins a new strip within one, every second triangle is turned."""
+    """The triangles (t, 3) of triangle strips; -1 begins a new strip, every second triangle is turned."""
     ends = np.cumsum(sizes)
     begins = np.zeros(len(indices) + 1, bool)
     begins[ends - sizes] = True
@@ -262,7 +266,7 @@ def _corner_uv(
 
 @kernel
 def _walk(buffer, at, item, count, swap, offsets, sizes):  # type: ignore[no-untyped-def]
-    """Where each property of each row lies; ends early where the buffer does. End of the rows, and whole rows."""
+    """Where each property of each row lies. Returns the end of the rows, and how many the buffer holds."""
     properties, rows = offsets.shape
     scratch = np.empty(8, np.uint8)
     for row in range(rows):

@@ -13,8 +13,8 @@ from weathercoat.mesh.formats.text import normalise
 OWN = ("obj", "ply", "stl", "off", "glb", "gltf", "zip")
 # What meshio reads beyond those, by extension.
 FOREIGN = (
-    "vtk", "vtu", "msh", "inp", "mesh", "meshb", "med", "nas", "bdf", "fem", "tec", "dat", "xml", "xdmf", "xmf", "cgns",
-    "e", "exo", "ex2", "h5m", "avs", "su2", "ugrid", "wkt", "mdpa", "f3grid", "node", "ele", "post", "dato",
+    "vtk", "vtu", "msh", "inp", "mesh", "meshb", "med", "nas", "bdf", "fem", "tec", "dat", "xml", "xdmf", "xmf",
+    "cgns", "e", "exo", "ex2", "h5m", "avs", "su2", "ugrid", "wkt", "mdpa", "f3grid", "node", "ele", "post", "dato",
 )  # fmt: skip
 
 _STRANGERS = (
@@ -37,7 +37,7 @@ _STRANGERS = (
 
 
 def identify(data: bytes, extension: str) -> tuple[str, Note | None]:
-    """The format of `data`, which comes with an `extension` (without the dot, in lower case), and W-FORMAT if they disagree.
+    """The format of `data` named with `extension` (no dot, lower case), and W-FORMAT where the two disagree.
 
     Errors: FormatError, which says what the content looks like.
     """

@@ -1,6 +1,7 @@
 """STL, binary and text.
 
-Source: 3D Systems, StereoLithography Interface Specification, 1989. Binary files may begin with "solid" as well: their size tells.
+Source: 3D Systems, StereoLithography Interface Specification, 1989. Binary files may begin with "solid" as
+well: their size tells.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def is_binary_stl(data: bytes) -> bool:
 def looks_like_coordinates(data: bytes) -> bool:
     """Whether the records of `data`, taken as binary STL with whatever count, are mostly sensible numbers.
 
-    Of random bits, taken as float32, a third lies between 1e-12 and 1e12; of coordinates and normals almost all.
+    Of random bits, taken as float32, a third lies between 1e-12 and 1e12; of coordinates and normals almost
+    all.
     """
     whole = (len(data) - HEADER_BYTES) // FACET.itemsize
     if whole < 1:
@@ -92,7 +94,7 @@ def _read_text(data: bytes) -> Polygons:
     if len(short):
         raise CorruptError(f"line {lines.number[vertex[short[0]]]}: a vertex has 3 coordinates")
     polygons = _soup(lines.numbers(vertex).reshape(-1, 3), single_precision=False)
-    names = decode_names([lines.text(line) for line in begins])
+    names = decode_names([lines.text(line) for line in begins.tolist()])
     names = ["default", *(name or "default" for name in names)]
     polygons.face_group, polygons.groups = number_groups(np.searchsorted(begins, vertex[::3]), names)
     return polygons
