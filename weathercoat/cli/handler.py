@@ -64,7 +64,7 @@ def call(arguments: Sequence[str]) -> int:
         click.echo(error.format_message(), err=True)
         return error.exit_code
     except Exception as error:
-        return _report(_as_weathercoat_error(error), arguments)
+        return _report(error, arguments)
 
 
 def _as_weathercoat_error(error: Exception) -> WeathercoatError:
@@ -85,10 +85,11 @@ def _as_weathercoat_error(error: Exception) -> WeathercoatError:
     )
 
 
-def _report(error: WeathercoatError, arguments: Sequence[str]) -> int:
+def _report(raised: Exception, arguments: Sequence[str]) -> int:
     options = arguments[: arguments.index("--")] if "--" in arguments else arguments
     if "--debug" in options:
-        traceback.print_exception(error.__cause__ or error.__context__ or error)
+        traceback.print_exception(raised)
+    error = _as_weathercoat_error(raised)
     if "--json" in options:
         _say(json.dumps({"error": _as_dict(error)}, ensure_ascii=False))
     else:
