@@ -23,19 +23,20 @@ def make_sheet(cells: int = CELLS) -> tuple[np.ndarray, np.ndarray]:
 def make_snapshot(
     *,
     cells: int = CELLS,
+    mesh: tuple[np.ndarray, np.ndarray] | None = None,
     lost: int = 0,
     split_column: int | None = None,
     step: int = 100,
     age: float = 0.5,
     offset: float = 0.0,
 ) -> Snapshot:
-    """A snapshot of the sheet above.
+    """A snapshot of the sheet above, or of another mesh, which cannot be split.
 
     The first `lost` faces have fallen. With `split_column` the film is cut along the grid line of that
     number, and the part behind the cut is separated and lifted. Scalars and colours differ from vertex to
     vertex.
     """
-    vertices, faces = make_sheet(cells)
+    vertices, faces = mesh or make_sheet(cells)
     vertices = vertices + offset
     film_vertices, film_faces = vertices.copy(), faces.copy()
     origin = np.arange(len(vertices), dtype=np.int32)

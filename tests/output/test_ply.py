@@ -178,6 +178,22 @@ def test_metal_lies_under_the_film_everywhere(tmp_path: Path) -> None:
     assert hair(snapshot) == 5e-4
 
 
+def test_no_metal_shows_through_an_intact_film(tmp_path: Path) -> None:
+    """From every side of a box with sharp edges, a ray towards the film meets the film first."""
+    pytest.importorskip("embreex")
+    box = trimesh.creation.box().subdivide().subdivide()
+    snapshot = make_snapshot(mesh=(np.asarray(box.vertices), np.asarray(box.faces, np.int32)))
+    ply = read_ply_arrays(write_snapshot_ply(tmp_path, snapshot, "a"))
+    mesh = trimesh.Trimesh(ply.vectors("x", "y", "z"), ply.faces, process=False)
+    random = np.random.default_rng(1)
+    film = random.choice(np.flatnonzero(ply.face["part"] == 1), 5000)
+    targets = np.einsum("ni,nij->nj", random.dirichlet([1, 1, 1], len(film)), mesh.triangles[film])
+    directions = random.normal(size=targets.shape)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    first = mesh.ray.intersects_first(targets + 5 * directions, -directions)
+    assert first.min() >= 0 and (ply.face["part"][first] == 1).all()
+
+
 def test_a_mesh_that_is_no_snapshot_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.ply"
     write_example(path)
