@@ -5,7 +5,7 @@ BIN := .venv/bin
 DEMO := demo
 
 # The environment is made anew when the dependencies or the interpreter change, whatever the times of files say.
-FINGERPRINT := $(shell { cat pyproject.toml; $(PYTHON) --version; } 2>&1 | cksum | tr ' ' '-')
+FINGERPRINT := $(shell { cat pyproject.toml $(wildcard setup.py); $(PYTHON) --version; } 2>&1 | cksum | tr ' ' '-')
 
 # Tests on real meshes run where a checkout has them beside it.
 ifneq ($(wildcard ../shared/meshes/index.tsv),)
