@@ -1,0 +1,115 @@
+"""Films in a known state for the tests: every value that decides is set by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tests.zoo import find_edge, find_half_edge, make_mesh
+from weathercoat.film.flaking import flake
+from weathercoat.film.fracture import fracture
+from weathercoat.film.state import (
+    FilmParameters,
+    FilmRules,
+    FilmState,
+    evaluate_tension,
+    make_film_rules,
+    make_film_state,
+)
+from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, check_half_edges, make_event_log
+from weathercoat.mesh.surface import Indices, Surface, Vectors
+
+# A film of tension 1 for ever that no defect or scatter disturbs, under the paper's literal rules of fracture.
+STEADY = {
+    "tension_law": "saturating",
+    "tension_initial": 1.0,
+    "tension_rate": 0.0,
+    "adhesion_base": 1.0,
+    "adhesion_amplitude": 0.0,
+    "adhesion_decay_rate": 0.0,
+    "cohesion_base": 1000.0,
+    "cohesion_scatter": 0.0,
+    "cohesion_decay_rate": 0.0,
+    "defects_rule": "share",
+    "defects_share": 0.0,
+    "lift_coefficient": 0.1,
+    "lift_convexity": 2.0,
+    "fracture_direction_threshold": 0.45,
+    "fracture_direction_factor": 0.2,
+    "fracture_relaxation": "faces",
+    "fracture_face_factor": 0.5,
+    "fracture_rounds": "one",
+    "flaking_rule": "islands",
+    "flaking_hanging_share": 0.0,
+}
+
+
+@dataclass
+class Film:
+    """A mesh of the zoo with its film and log; vertices are separated unless `attached` names them."""
+
+    mesh: HalfEdgeMesh
+    state: FilmState
+    parameters: FilmParameters
+    log: EventLog
+    initial_twin: Indices
+    positions: Vectors = field(repr=False)
+
+    @property
+    def rules(self) -> FilmRules:
+        return make_film_rules(self.parameters)
+
+    def set_cohesion(self, value: float, *edges: tuple[int, int]) -> None:
+        """Give both half-edges of each edge, a pair of rest vertices, a cohesion."""
+        for a, b in edges:
+            h = find_edge(self.mesh, a, b)
+            self.state.cohesion[h] = value
+            if self.initial_twin[h] >= 0:
+                self.state.cohesion[self.initial_twin[h]] = value
+
+    def half_edge(self, a: int, b: int) -> int:
+        return find_half_edge(self.mesh, a, b)
+
+    def fracture(self, age: float = 1.0, duration: float = 1.0) -> set[tuple[int, int]]:
+        """One call of `fracture`; the edges that broke in it, as pairs of rest vertices, and a sound mesh."""
+        self.log.clear()
+        evaluate_tension(self.state, self.rules, age)
+        fracture(self.mesh, self.state, self.parameters, age, duration, self.log)
+        assert check_half_edges(self.mesh) == ""
+        tail, head = self.mesh.faces.reshape(-1), self.mesh.faces[:, [1, 2, 0]].reshape(-1)
+        return {
+            (int(min(tail[h], head[h])), int(max(tail[h], head[h]))) for h in self.log.break_entries()[:, 0]
+        }
+
+    def flake(self, age: float = 1.0, released: int = 1) -> list[float]:
+        """One call of `flake` in a step in which `released` vertices let go; the areas that fell."""
+        self.log.clear()
+        areas = flake(self.mesh, self.state, self.parameters, age, released, self.log)
+        assert check_half_edges(self.mesh) == ""
+        return areas.tolist()
+
+    def tips(self) -> dict[int, tuple[float, float, float]]:
+        """The tips with their directions, rounded to 1e-12."""
+        return {
+            int(v): tuple(np.round(self.state.crack_direction[v], 12) + 0.0)
+            for v in np.flatnonzero(self.state.is_tip[: self.mesh.vertex_count])
+        }
+
+    def copies(self, origin: int) -> list[int]:
+        """The film vertices in use that stem from a rest vertex."""
+        used = np.unique(self.mesh.tail[np.repeat(self.mesh.alive, 3)])
+        return [int(v) for v in used if self.mesh.origin[v] == origin]
+
+
+def make_film(surface: Surface, *, attached: tuple[int, ...] = (), seed: int = 1, **changes: object) -> Film:
+    """A separated film in the STEADY state, but for `changes`."""
+    mesh = make_mesh(surface)
+    parameters = FilmParameters(**{**STEADY, **changes})  # type: ignore[arg-type]
+    state = make_film_state(mesh, parameters, seed)
+    free = np.setdiff1d(np.arange(mesh.vertex_count), attached)
+    state.separated[free] = True
+    state.separation_age[free] = 0.0
+    return Film(
+        mesh, state, parameters, make_event_log(len(mesh.faces)), mesh.twin.copy(), mesh.positions.copy()
+    )
