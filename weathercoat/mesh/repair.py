@@ -135,11 +135,11 @@ def check_precision(points: Points, single_precision: bool) -> None:
         raise NoAreaError("all vertices lie at one point")
     if resolution > MIN_RESOLUTION * diagonal:
         raise PrecisionError(
-            f"coordinates near {largest:.3g} are stored to {resolution:.2g}, the model is {diagonal:.3g} across"
+            f"coordinates near {largest:.3g} are stored to {resolution:.2g}, the model spans {diagonal:.3g}"
         )
     if not MIN_DIAGONAL <= diagonal <= MAX_DIAGONAL:
         raise ScaleError(
-            f"the model is {diagonal:.3g} across; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} are possible"
+            f"the model spans {diagonal:.3g}; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} are possible"
         )
 
 
@@ -149,8 +149,8 @@ def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tu
     The tolerance is the rounding of float32, relative, so that no scale, proportion or offset changes what
     is merged: two coordinates are the same where they differ by 2^-23 of their own magnitude, since most
     programs round to float32 whatever they write afterwards; on an axis on which the model lies far from
-    the origin, 2^-23 of its extent there instead. It never exceeds 2^-22 of the extent, far below the thickness
-    of any sheet.
+    the origin, 2^-23 of its extent there instead. It never exceeds 2^-22 of the extent, far below the
+    thickness of any sheet.
 
     Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file
     there; and how many vertices were merged away.
@@ -303,7 +303,7 @@ def make_oriented_manifold(
 
 def _drop_nonfinite(polygons: Polygons) -> list[Note]:
     """Drop the faces that use a position which is not finite."""
-    broken: NDArray[np.bool_] = ~np.isfinite(polygons.positions).all(axis=1)
+    broken = np.logical_not(np.isfinite(polygons.positions).all(axis=1))
     at_broken = broken[polygons.corners]
     if not at_broken.any():
         return []

@@ -80,10 +80,10 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
     total = np.bincount(component, area, components)
     kept = np.bincount(component, area * sign, components)
     # Volumes about the middle of each component, so that a far origin costs no digits.
-    middle = np.stack(
+    total_center = np.stack(
         [np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1
     )
-    middle = center / np.bincount(component, minlength=components)[:, None]
+    middle = total_center / np.bincount(component, minlength=components)[:, None]
     arm = corner.mean(axis=1) - middle[component]
     volume = np.bincount(component, sign * np.einsum("ij,ij->i", arm, normal) / 6.0, components)
     closed = np.bincount(component, (twin.reshape(-1, 3) < 0).any(axis=1), components) == 0

@@ -18,8 +18,8 @@ from weathercoat.mesh.formats.text import Lines, decode_names, join_continued, n
 
 PASSED_OVER = (
     "l", "p", "s", "vp", "mtllib", "usemap", "maplib", "mg", "cstype", "deg", "bmat", "step", "curv", "curv2",
-    "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod", "ctech",
-    "stech", "call", "csh", "bsp", "bzp", "cdc", "cdp", "res", "vw",
+    "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod",
+    "ctech", "stech", "call", "csh", "bsp", "bzp", "cdc", "cdp", "res", "vw",
 )  # fmt: skip
 # Longer than the eight characters that tell keywords apart.
 _LONG = {b"shadow_obj", b"trace_obj"}

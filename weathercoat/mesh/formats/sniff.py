@@ -13,8 +13,9 @@ from weathercoat.mesh.formats.text import normalise
 OWN = ("obj", "ply", "stl", "off", "glb", "gltf", "zip")
 # What meshio reads beyond those, by extension.
 FOREIGN = (
-    "vtk", "vtu", "msh", "inp", "mesh", "meshb", "med", "nas", "bdf", "fem", "tec", "dat", "xml", "xdmf", "xmf",
-    "cgns", "e", "exo", "ex2", "h5m", "avs", "su2", "ugrid", "wkt", "mdpa", "f3grid", "node", "ele", "post", "dato",
+    "vtk", "vtu", "msh", "inp", "mesh", "meshb", "med", "nas", "bdf", "fem", "tec", "dat", "xml",
+    "xdmf", "xmf", "cgns", "e", "exo", "ex2", "h5m", "avs", "su2", "ugrid", "wkt", "mdpa",
+    "f3grid", "node", "ele", "post", "dato",
 )  # fmt: skip
 
 _STRANGERS = (
