@@ -51,7 +51,7 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
     for key, value in found.items():
         title = key.replace("_", " ")
         if key == "notes":
-            yield from (f"{'repair':18} {note['code']}({note['count']}): {note['message']}" for note in value)
+            yield from (f"{'note':18} {note['code']}({note['count']}): {note['message']}" for note in value)
         elif key == "groups":
             yield from (f"{'group':18} {group['name']}: {group['faces']:,} faces" for group in value)
         elif key == "run_cost":
