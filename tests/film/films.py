@@ -9,6 +9,7 @@ import numpy as np
 from tests.zoo import find_edge, find_half_edge, make_mesh
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
+from weathercoat.film.lift import disturb
 from weathercoat.film.state import (
     FilmParameters,
     FilmRules,
@@ -110,6 +111,7 @@ def make_film(surface: Surface, *, attached: tuple[int, ...] = (), seed: int = 1
     free = np.setdiff1d(np.arange(mesh.vertex_count), attached)
     state.separated[free] = True
     state.separation_age[free] = 0.0
+    disturb(mesh, state, free.astype(np.int32))
     return Film(
         mesh, state, parameters, make_event_log(len(mesh.faces)), mesh.twin.copy(), mesh.positions.copy()
     )

@@ -31,7 +31,7 @@ def first_steps(film: Film) -> dict[int, int]:
     when: dict[int, int] = {}
     for step in range(1, STEPS + 1):
         found = separating(film, step / STEPS)
-        separate(film.state, np.array(found, np.int32), step / STEPS)
+        separate(film.mesh, film.state, np.array(found, np.int32), step / STEPS)
         when.update(dict.fromkeys(found, step))
     return when
 
@@ -79,7 +79,7 @@ def test_weak_places_go_first_and_none_goes_twice() -> None:
     film = attached_film(zoo.make_disc(6), lift_sum="per_valence", lift_coefficient=0.25, adhesion_base=1.0)
     film.state.adhesion[[3, 5]] = 0.7
     assert separating(film, 0.5) == [3, 5]
-    separate(film.state, np.array([3, 5], np.int32), 0.5)
+    separate(film.mesh, film.state, np.array([3, 5], np.int32), 0.5)
     assert film.state.separated[:7].tolist() == [False, False, False, True, False, True, False]
     assert film.state.separation_age[[3, 5]].tolist() == [0.5, 0.5]
     assert separating(film, 0.6) == []

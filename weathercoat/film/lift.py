@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
-from weathercoat.film.state import FilmState
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
+
+if TYPE_CHECKING:
+    from weathercoat.film.state import FilmState
 
 
 @kernel
@@ -37,6 +40,51 @@ def lift_factor_now(
 
 
 @kernel
+def lift_on(
+    first: int,
+    positions: Vectors,
+    tail: Indices,
+    twin: Indices,
+    separated: NDArray[np.bool_],
+    rest_factor: Vectors,
+    convexity: float,
+    face_tension: Vectors,
+    per_valence: bool,
+) -> tuple[float, int]:
+    """Sum of tension times lift factor over the half-edges opposite to an attached vertex, and their number.
+
+    first: the half-edge at which the vertex's fan begins.
+    per_valence scales the sum to six half-edges, so that valence and rim do not matter.
+    """
+    total = 0.0
+    count = 0
+    leaving = first
+    while leaving >= 0:
+        h = next_of(leaving)
+        total += face_tension[h // 3] * lift_factor_now(
+            h, positions, tail, twin, separated, rest_factor, convexity
+        )
+        count += 1
+        leaving = twin[prev_of(leaving)]
+        if leaving == first:
+            break
+    if per_valence and count > 0:
+        total *= 6.0 / count
+    return total, count
+
+
+@kernel
+def sum_rest_lift(mesh: HalfEdgeMesh, rest_factor: Vectors, per_valence: bool, out: Vectors) -> None:
+    """The sum of `lift_on` for each vertex of the film at rest, under a tension of 1, into out (n0,)."""
+    attached = np.zeros(len(out), np.bool_)
+    ones = np.ones(len(mesh.alive))
+    for v in range(len(out)):
+        out[v], _ = lift_on(
+            mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, attached, rest_factor, 0.0, ones, per_valence
+        )
+
+
+@kernel
 def sum_lift(
     mesh: HalfEdgeMesh,
     state: FilmState,
@@ -48,23 +96,68 @@ def sum_lift(
 ) -> None:
     """Sum over the half-edges opposite to each attached vertex of tension times lift factor, into out (n,).
 
-    face_tension: (m,), the tension that lifts. per_valence scales the sum to six half-edges, so that valence and rim do
-    not matter. opposite_count is scratch (n,). The lift itself is k times the result.
+    face_tension: (m,), the tension that lifts; opposite_count (n,): the number of those half-edges. Both are 0 for
+    vertices that have separated. The lift itself is k times the result.
     """
-    positions, tail, twin, alive = mesh.positions, mesh.tail, mesh.twin, mesh.alive
-    separated, rest_factor = state.separated, state.lift_factor
     out[:] = 0.0
     opposite_count[:] = 0
-    for f in range(len(alive)):
-        if not alive[f]:
+    for v in range(len(out)):
+        if not state.separated[v] and mesh.half_edge[v] >= 0:
+            out[v], opposite_count[v] = lift_on(
+                mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, state.separated, state.lift_factor,
+                convexity, face_tension, per_valence,
+            )  # fmt: skip
+
+
+@kernel
+def find_overcome(
+    mesh: HalfEdgeMesh,
+    state: FilmState,
+    convexity: float,
+    per_valence: bool,
+    lift_scale: float,
+    adhesion_loss: float,
+    face_tension: Vectors,
+    is_uniform: bool,
+    out: Indices,
+) -> int:
+    """Collect in out the attached vertices with `lift_scale` times their sum above their adhesion; returns how many.
+
+    Adhesion is that at the start less `adhesion_loss`, not below 0. Where the tension is the same everywhere, vertices round
+    which nothing has moved keep the sum that they had at the start, `rest_lift`.
+    """
+    positions, tail, twin, half_edge, origin = mesh.positions, mesh.tail, mesh.twin, mesh.half_edge, mesh.origin
+    separated, disturbed, adhesion = state.separated, state.disturbed, state.adhesion
+    rest_factor, rest_lift = state.lift_factor, state.rest_lift
+    found = 0
+    # vertices beyond the first ones are copies at cracks, which have all separated
+    for v in range(len(adhesion)):
+        if separated[v] or half_edge[v] < 0:
             continue
-        for h in range(3 * f, 3 * f + 3):
-            apex = tail[prev_of(h)]
-            if not separated[apex]:
-                factor = lift_factor_now(h, positions, tail, twin, separated, rest_factor, convexity)
-                out[apex] += face_tension[f] * factor
-                opposite_count[apex] += 1
-    if per_valence:
-        for v in range(len(out)):
-            if opposite_count[v] > 0:
-                out[v] *= 6.0 / opposite_count[v]
+        if is_uniform and not disturbed[v]:
+            total = rest_lift[v]
+        else:
+            total, _ = lift_on(
+                half_edge[v], positions, tail, twin, separated, rest_factor, convexity, face_tension, per_valence
+            )
+        if lift_scale * total > max(adhesion[origin[v]] - adhesion_loss, 0.0):
+            out[found] = v
+            found += 1
+    return found
+
+
+@kernel
+def disturb(mesh: HalfEdgeMesh, state: FilmState, vertices: Indices) -> None:
+    """Mark the vertices whose lift depends on one of these, which move from now on."""
+    tail, twin, half_edge, disturbed = mesh.tail, mesh.twin, mesh.half_edge, state.disturbed
+    for v in vertices:
+        leaving = half_edge[v]
+        while leaving >= 0:
+            h = next_of(leaving)
+            disturbed[tail[h]] = True
+            disturbed[tail[next_of(h)]] = True
+            if twin[h] >= 0:
+                disturbed[tail[prev_of(twin[h])]] = True
+            leaving = twin[prev_of(leaving)]
+            if leaving == half_edge[v]:
+                break

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from weathercoat.film.lift import sum_lift
-from weathercoat.film.state import FilmParameters, FilmState, adhesion_at, drying_tension
+from weathercoat.film.lift import disturb, find_overcome
+from weathercoat.film.state import FilmParameters, FilmState, drying_tension
 from weathercoat.mesh.halfedge import HalfEdgeMesh
 from weathercoat.mesh.surface import Indices, Vectors
 
@@ -18,20 +17,19 @@ def find_separating(mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParame
     crack on the metal for ever. Tensions must have been evaluated at this age.
     """
     p = parameters
-    count = mesh.vertex_count
-    tension = state.tension_now
-    if p.lift_tension == "drying":
-        tension = np.full(len(tension), drying_tension(p, age))
-    total = np.empty(count)
-    sum_lift(
-        mesh, state, p.lift_convexity, tension, p.lift_sum == "per_valence", total, np.empty(count, np.int32)
-    )
-    attached: NDArray[np.bool_] = ~state.separated[:count] & (mesh.half_edge[:count] >= 0)
-    adhesion = adhesion_at(state.adhesion, p, age)[mesh.origin[:count]]
-    return np.flatnonzero(attached & (p.lift_coefficient * total > adhesion)).astype(np.int32)
+    is_uniform = p.lift_tension == "drying"
+    scale = p.lift_coefficient * (drying_tension(p, age) if is_uniform else 1.0)
+    weight = np.ones(len(mesh.alive)) if is_uniform else state.tension_now
+    found = np.empty(len(state.adhesion), np.int32)
+    count = find_overcome(
+        mesh, state, p.lift_convexity, p.lift_sum == "per_valence", scale,
+        p.adhesion_decay_rate * p.adhesion_base * age, weight, is_uniform, found,
+    )  # fmt: skip
+    return found[:count].copy()
 
 
-def separate(state: FilmState, vertices: Indices, age: float) -> None:
+def separate(mesh: HalfEdgeMesh, state: FilmState, vertices: Indices, age: float) -> None:
     """Let the vertices go."""
     state.separated[vertices] = True
     state.separation_age[vertices] = age
+    disturb(mesh, state, vertices)

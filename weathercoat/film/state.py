@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.film.lift import sum_rest_lift
 from weathercoat.film.noise import fractal_noise, hash_bits, hash_uniform, stream_key
 from weathercoat.mesh.dihedral import all_bends
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh
@@ -81,7 +82,8 @@ class FilmState(NamedTuple):
     tension_now (m,), evaluated at the age of the step; fray_age (m,), when the face got its first broken edge, infinite
     before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie
     uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a
-    round of fracture carried over between steps. mean_edge: mean rest length of the edges.
+    round of fracture carried over between steps. mean_edge: mean rest length of the edges. rest_lift (n0,): what the film
+    lifts with at tension 1 while nothing round the vertex has moved; disturbed bool (3 m,), where something has.
     """
 
     adhesion: Vectors
@@ -99,6 +101,8 @@ class FilmState(NamedTuple):
     tie: NDArray[np.uint64]
     crack_budget: Vectors
     mean_edge: float
+    rest_lift: Vectors
+    disturbed: NDArray[np.bool_]
 
 
 def make_film_rules(parameters: FilmParameters) -> FilmRules:
@@ -134,6 +138,9 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
     cohesion[hash_uniform(midpoint, stream_key(seed, "defects")) < share] *= p.defects_strength
     bends = np.empty(capacity)
     all_bends(mesh.positions, mesh.tail, mesh.twin, bends)
+    lift_factor = 1.0 / (1.0 + np.exp(-p.lift_convexity * bends))
+    rest_lift = np.empty(mesh.vertex_count)
+    sum_rest_lift(mesh, lift_factor, p.lift_sum == "per_valence", rest_lift)
     return FilmState(
         adhesion=p.adhesion_base + p.adhesion_amplitude * noise,
         separated=np.zeros(capacity, np.bool_),
@@ -146,10 +153,12 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
         tension_now=np.full(face_count, p.tension_initial),
         fray_age=np.full(face_count, np.inf),
         cohesion=cohesion,
-        lift_factor=1.0 / (1.0 + np.exp(-p.lift_convexity * bends)),
+        lift_factor=lift_factor,
         tie=hash_bits(midpoint, stream_key(seed, "ties")),
         crack_budget=np.zeros(1),
         mean_edge=float(edge_length.mean()),
+        rest_lift=rest_lift,
+        disturbed=np.zeros(capacity, np.bool_),
     )
 
 

@@ -90,7 +90,7 @@ class Simulation:
         evaluate_tension(self.film, make_film_rules(self.film_parameters), age)
 
         separating = find_separating(self.mesh, self.film, self.film_parameters, age)
-        separate(self.film, separating, age)
+        separate(self.mesh, self.film, separating, age)
         release(self.mesh, self.constraints, separating, age)
         rust_room.expose_lifted(self.mesh, self.rust, separating, age)
 
