@@ -240,6 +240,18 @@ def test_sample_options_are_the_arguments_of_the_shape(capsys: pytest.CaptureFix
     assert sorted(path.name for path in Path().iterdir()) == ["p.ply"]
 
 
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb"])
+def test_samples_stand_upright_in_every_format(suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["sample", "plate", "--height", "3", "-o", f"p.{suffix}"]) == 0
+    capsys.readouterr()
+    assert call(["inspect", f"p.{suffix}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    low, high = found["bounding_box"]
+    extent = [b - a for a, b in zip(low, high, strict=True)]
+    upwards = [abs(part) for part in found["up"]].index(1.0)
+    assert extent[upwards] == pytest.approx(3)
+
+
 def test_inspect_in_words_names_repairs_and_cost(capsys: pytest.CaptureFixture[str]) -> None:
     Path("t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 2\n")
     assert call(["inspect", "t.obj", "--self-intersections"]) == 0

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from weathercoat.config.load import Override, load_config
 from weathercoat.config.presets import preset_names
@@ -184,3 +186,21 @@ def test_every_shipped_config_loads(name: str) -> None:
     given = [key for key, origin in loaded.origins.items() if origin != "default"]
     assert all(loaded.origins[key].startswith(f"preset {name}:") for key in given)
     assert given
+
+
+KEYS = st.sampled_from(
+    ["remesh", "snapshots", "snapshots.count", "snapshots.steps", "paint.except", "seed", "curl"]
+)
+VALUES = st.sampled_from(
+    ["3", "off", "[1, 2]", "{count: 2}", "{faces: 9}", "null", "", "x", "1e400", "{rule: angle}", "[{a: 1}]"]
+)
+
+
+@given(st.lists(st.tuples(KEYS, VALUES), max_size=5), st.sampled_from(["standard", "literal"]))
+def test_any_mix_of_overrides_loads_or_names_its_problems(mix: list[tuple[str, str]], base: str) -> None:
+    try:
+        loaded = load_config(base, [f"{key}={value}" for key, value in mix])
+    except ConfigError as error:
+        assert all(problem.what for problem in error.problems)
+    else:
+        assert Config.model_validate(loaded.config.as_dict()) == loaded.config

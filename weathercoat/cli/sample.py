@@ -34,6 +34,7 @@ def command() -> None:
 
 def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
     def write(output: Path | None, size: float | None, overwrite: bool, **arguments: float) -> None:
+        from weathercoat.mesh.read import UP_OF_FORMAT
         from weathercoat.output.meshes import write_mesh
 
         path = output or Path(f"{name}.obj")
@@ -41,6 +42,9 @@ def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
         if size is not None:
             extent = (surface.vertices.max(axis=0) - surface.vertices.min(axis=0)).max()
             surface = replace(surface, vertices=surface.vertices * (size / extent))
+        if UP_OF_FORMAT.get(path.suffix.lower().lstrip(".")) == "z":
+            turned = surface.vertices[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
+            surface = replace(surface, vertices=turned, up=(0.0, 0.0, 1.0))
         write_mesh(path, surface, overwrite=overwrite)
         click.echo(f"written to {path}")
 

@@ -449,6 +449,17 @@ def section_of(field: FieldInfo) -> type[Section] | None:
     return None
 
 
+def section_at(path: tuple[str, ...]) -> type[Section] | None:
+    """The section at a path of keys, all of the config for none; None for a parameter or unknown key."""
+    section: type[Section] | None = Config
+    for name in path:
+        if section is None:
+            return None
+        fields = ((field.alias or key, field) for key, field in section.model_fields.items())
+        section = next((section_of(field) for key, field in fields if key == name), None)
+    return section
+
+
 def parameters(section: type[Section] = Config, prefix: str = "") -> Iterator[Parameter]:
     """Every parameter below `section`, in the order of the schema."""
     for name, field in section.model_fields.items():
