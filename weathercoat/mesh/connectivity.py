@@ -1,11 +1,12 @@
 """The triangle mesh that remeshing edits: half-edges that are split, collapsed and flipped in place.
 
-Half-edge h = 3 f + i runs along side i of face f, as in `halfedge`. New faces and vertices are appended; a face that is
-gone has tail -1, a vertex that is gone has half_edge -1, and `compact` drops both. Features (creases, boundaries and
-borders of groups) are edges with `crease` >= 0, the number of the chain that they lie on, the same on both half-edges.
+Half-edge h = 3 f + i runs along side i of face f, as in `halfedge`. New faces and vertices are appended; a
+face that is gone has tail -1, a vertex that is gone has half_edge -1, and `compact` drops both. Features
+(creases, boundaries and borders of groups) are edges with `crease` >= 0, the number of the chain that they
+lie on, on both half-edges.
 
 Invariants, after every operation:
-- twin is an involution between live faces, and twins run in opposite directions between the same two vertices;
+- twin is an involution between live faces, and twins run in opposite directions between the same vertices;
 - the live faces round a vertex form one fan, which `half_edge` begins where it is open;
 - no two edges join the same two vertices, and every feature of the input still has its edges.
 """
@@ -28,9 +29,9 @@ FREE = -1
 class EditableMesh(NamedTuple):
     """Arrays with room to grow; `count` (2,) holds how many vertices and faces are in use.
 
-    Over vertices: position (., 3); chain, FREE or the chain that the vertex lies on or its corner; arc, its arc length
-    along that chain; half_edge. Over half-edges: tail, twin, crease. Over faces: source, a face of the input nearby on
-    the same side of all features.
+    Over vertices: position (., 3); chain, FREE or the chain that the vertex lies on or its corner; arc, its
+    arc length along that chain; half_edge. Over half-edges: tail, twin, crease. Over faces: source, a face
+    of the input nearby on the same side of all features.
     """
 
     position: Vectors
@@ -119,8 +120,8 @@ def split_edge(h: int, mesh: EditableMesh) -> int:
 
              c                      c
            /   \                  / | \
-          /     \                /  |  \         h keeps the half of the edge at its tail; the new faces take the
-         a --h-- b     -->      a --m-- b        half at its head
+          /     \                /  |  \         h keeps the half of the edge at its tail;
+         a --h-- b     -->      a --m-- b        the new faces take the half at its head
           \     /                \  |  /
            \   /                  \ | /
              d                      d
@@ -221,9 +222,9 @@ def _pair(h: int, outer: int, chain: int, mesh: EditableMesh) -> None:
 
 @kernel
 def collapse_edge(h: int, mesh: EditableMesh) -> None:
-    """Remove the tail of h and the faces of its edge; what was at the tail is now at the head, where that lies.
+    """Remove the tail of h and the faces of its edge; the head takes over the tail's other faces.
 
-    The caller has asked `is_collapsible`.
+    The caller has made sure by `edits.keeps_topology` that the mesh stays a manifold.
     """
     tail, twin = mesh.tail, mesh.twin
     g = twin[h]
@@ -249,7 +250,7 @@ def collapse_edge(h: int, mesh: EditableMesh) -> None:
 
 @kernel
 def _zip_face(h: int, mesh: EditableMesh) -> int:
-    """Remove the face of h, whose two ends are one vertex now, and join its other sides; returns one from that vertex."""
+    """Remove the face of h, whose ends are one vertex now, and join its other sides; returns one of those."""
     tail, twin, crease = mesh.tail, mesh.twin, mesh.crease
     to_apex, from_apex = next_of(h), prev_of(h)
     apex = tail[from_apex]

@@ -1,34 +1,37 @@
 """Feature lines: the creases, boundaries and group borders that remeshing keeps, as chains between corners.
 
-A chain is a polyline of input edges between two corners. A vertex of the new mesh on a chain is known by its arc length, so
-it can only slide along the input's own line. Creases come from the dihedral angle; on a noisy scan most of these edges
-are noise, so short ones go. Corners are where chains meet or end, where a line turns at the scale of the new edges,
-and two on every loop, so that each chain has two different ends.
+A chain is a polyline of input edges between two corners. A vertex of the new mesh on a chain is known by
+its arc length, so it can only slide along the input's own line. Creases come from the dihedral angle; on a
+noisy scan most of these edges are noise, so short ones go. Corners are where chains meet or end, where a
+line turns at the scale of the new edges, and two on every loop, so that each chain has two different ends.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
-from weathercoat.mesh.connectivity import FREE
+from weathercoat.mesh.connectivity import FREE, EditableMesh
 from weathercoat.mesh.surface import Indices, Vectors, face_normals
 
 _TURN = np.radians(50.0)  # a line that turns by more than this within an edge length has a corner there
+_SHARP_TURN = np.radians(70.0)  # such corners may be closer together than an edge length
 _SHORT = 4.0  # crease networks shorter than this many edge lengths are noise
+_SHORT_CHAIN = 1.5  # and networks whose chains are shorter than this on average
 _DANGLING = 2.0  # so are branches with a free end, shorter than this
 
 
 class Features(NamedTuple):
     """Chains and what lies on them.
 
-    crease: int32 (3 m,), the chain of each half-edge of the input or -1. vertex_chain: int32 (n,), FREE, the chain,
-    or -2 - k for corner k; vertex_arc: (n,), arc length along the chain. Chain c has the points
-    offset[c]:offset[c + 1] of `point` (., 3) with arc lengths `arc`, the input half-edge `segment` from each point to the
-    next, and the corners `first[c]` and `last[c]`.
+    crease: int32 (3 m,), the chain of each half-edge of the input or -1. vertex_chain: int32 (n,), FREE,
+    the chain, or -2 - k for corner k; vertex_arc: (n,), arc length along the chain. Chain c has the points
+    offset[c]:offset[c + 1] of `point` (., 3) with arc lengths `arc`, and the corners `first[c]` and
+    `last[c]`; `kept[c]` says that it is a boundary or a border of groups.
     """
 
     crease: Indices
@@ -37,9 +40,9 @@ class Features(NamedTuple):
     offset: Indices
     point: Vectors
     arc: Vectors
-    segment: Indices
     first: Indices
     last: Indices
+    kept: NDArray[np.bool_]
 
 
 def find_features(
@@ -50,9 +53,10 @@ def find_features(
     crease_angle: float,
     edge_length: float,
 ) -> Features:
-    """The features of a manifold mesh, vertices (n, 3) and faces (m, 3), for new edges of length `edge_length`.
+    """The features of a manifold mesh, vertices (n, 3), faces (m, 3), for new edges of length `edge_length`.
 
-    Creases bend by more than `crease_angle` [rad]; boundaries and borders of `face_group` (m,) are always kept.
+    Creases bend by more than `crease_angle` [rad]; boundaries and borders of `face_group` (m,) are kept
+    always.
     """
     tail = faces.reshape(-1)
     head = np.roll(faces, -1, axis=1).reshape(-1)
@@ -68,7 +72,9 @@ def find_features(
     bent = inner & has_normal & (cosine < np.cos(crease_angle)) & ~kept
     span = np.linalg.norm(vertices[head[h]] - vertices[tail[h]], axis=1)
     bent[bent] = ~_is_noise(tail[h], head[h], span, bent, kept, len(vertices), edge_length)[bent]
-    return _trace(vertices, tail, head, twin, h[kept | bent], edge_length)
+    always = np.zeros(len(twin), np.bool_)
+    always[h[kept]] = True
+    return _trace(vertices, tail, head, twin, h[kept | bent], always, edge_length)
 
 
 def _is_noise(
@@ -95,9 +101,10 @@ def _is_noise(
     graph = coo_array((np.ones(len(left)), (tail[left], head[left])), shape=(vertex_count, vertex_count))
     network = connected_components(graph, directed=False)[1][tail[left]]
     total = np.bincount(network, span[left])
-    drop[left] = total[network] < _SHORT * edge_length
     degree = np.bincount(np.concatenate([tail[left], head[left]]), minlength=vertex_count)
-    loops = np.bincount(network, (degree[tail[left]] != 2) | (degree[head[left]] != 2)) == 0
+    ends = np.bincount(network, 1.0 * (degree[tail[left]] != 2) + (degree[head[left]] != 2))
+    drop[left] = (total < np.maximum(_SHORT, 0.5 * _SHORT_CHAIN * ends) * edge_length)[network]
+    loops = ends == 0
     drop[left] &= ~(loops[network] & (total[network] > edge_length))
     return drop
 
@@ -113,7 +120,7 @@ def _prune_branches(
     shortest: float,
     vertex_count: int,
 ) -> None:
-    """Drop branches of creases from a free end to the next junction that are shorter than `shortest`, repeatedly."""
+    """Drop branches of creases, from a free end to a junction, shorter than `shortest`, repeatedly."""
     degree = np.zeros(vertex_count, np.int64)
     ends = np.zeros(
         vertex_count, np.int64
@@ -150,9 +157,15 @@ def _prune_branches(
 
 
 def _trace(
-    vertices: Vectors, tail: Indices, head: Indices, twin: Indices, features: Indices, edge_length: float
+    vertices: Vectors,
+    tail: Indices,
+    head: Indices,
+    twin: Indices,
+    features: Indices,
+    always: NDArray[np.bool_],
+    edge_length: float,
 ) -> Features:
-    """Chains of the feature edges, each given by one of its half-edges."""
+    """Chains of the feature edges, each given by a half-edge; `always` (3 m,) marks those that must stay."""
     vertex_count = len(vertices)
     ends = np.concatenate([tail[features], head[features]])
     order = np.argsort(ends, kind="stable")
@@ -193,9 +206,9 @@ def _trace(
         offset=offset.astype(np.int32),
         point=point,
         arc=arc,
-        segment=walk_half_edge,
         first=numbered[:chain_count].astype(np.int32),
         last=numbered[chain_count:].astype(np.int32),
+        kept=np.bincount(owner[inside], always[along], chain_count) > 0,
     )
 
 
@@ -203,7 +216,7 @@ def _trace(
 def _walk_chains(
     start: NDArray[np.int64], around: Indices, tail: Indices, head: Indices, half_edge_count: int
 ) -> tuple[Indices, Indices, Indices]:
-    """Vertices and half-edges of all chains one after the other, from node to node, then of all loops, and offsets."""
+    """Vertices and half-edges of all chains in a row, first from node to node, then loops; offsets."""
     done = np.zeros(half_edge_count, np.bool_)
     edge_count = len(around) // 2
     walk = np.empty(2 * edge_count, np.int32)
@@ -245,7 +258,7 @@ def _cut_at_turns(
         line = walk[offset[c] : offset[c + 1]]
         edges = walk_half_edge[offset[c] : offset[c + 1]]
         cuts, line, edges = _find_cuts(vertices, line, edges, edge_length)
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in itertools.pairwise(cuts):
             new_walk.append(line[first : last + 1])
             new_half_edge.append(np.append(edges[first:last], np.int32(-1)))
             new_offset.append(new_offset[-1] + last + 1 - first)
@@ -288,7 +301,8 @@ def _find_cuts_of_turned(
     for i in np.argsort(-turn[1:last], kind="stable") + 1:
         if turn[i] < _TURN:
             break
-        if all(abs(arc[i] - arc[j]) >= 0.3 * edge_length for j in cuts):
+        spacing = (0.3 if turn[i] > _SHARP_TURN else 1.0) * edge_length
+        if all(abs(arc[i] - arc[j]) >= spacing for j in cuts):
             cuts.append(int(i))
     if is_loop and len(cuts) == 2:
         cuts.append(1 + int(np.argmin(np.abs(arc[1:last] - 0.5 * arc[last]))))
@@ -314,6 +328,17 @@ def _turning(line: Vectors, is_loop: bool, edge_length: float) -> tuple[Vectors,
     after = np.stack([np.interp(ahead, known, points[:, k]) for k in range(3)], axis=1) - line
     sine = np.linalg.norm(np.cross(before, after), axis=1)
     return np.arctan2(sine, np.einsum("ij,ij->i", before, after)), arc
+
+
+def release_chains(mesh: EditableMesh, chains: NDArray[np.bool_]) -> None:
+    """Make the edges of the marked chains ordinary ones, and vertices that no other feature holds free."""
+    crease = mesh.crease[: 3 * int(mesh.count[1])]
+    crease[(crease >= 0) & chains[crease]] = -1
+    held = np.zeros(len(mesh.chain), np.bool_)
+    half_edges = np.flatnonzero(crease >= 0)
+    held[mesh.tail[half_edges]] = True
+    held[mesh.tail[half_edges - half_edges % 3 + (half_edges + 1) % 3]] = True
+    mesh.chain[~held] = FREE
 
 
 @kernel

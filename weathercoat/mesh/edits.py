@@ -1,13 +1,13 @@
-"""Passes over an `EditableMesh` that split long edges, collapse short ones and flip those that are not Delaunay.
+"""Passes over an `EditableMesh` that split long edges, collapse short ones and flip towards better triangles.
 
-Every edit is asked first whether it keeps the mesh a valid one: the link condition, features, no face turned over. `normals`
-are the unit normals of the input's faces (m, 3), by which a face that faces inwards is known.
+Every edit is asked first whether it keeps the mesh a valid one: the link condition, features, no face
+turned over. `normals` are the unit normals of the input's faces (m, 3), by which a face that faces inwards
+is known.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.connectivity import FREE, EditableMesh, collapse_edge, flip_edge, split_edge
@@ -49,7 +49,7 @@ def arc_on(v: int, chain: int, mesh: EditableMesh, features: Features) -> float:
 
 @kernel
 def longer_feature_beside(h: int, mesh: EditableMesh) -> int:
-    """The longest feature edge of the faces of the edge of h that is longer than that; h itself where there is none.
+    """The longest feature edge of the two faces of h that is longer than h; h itself where there is none.
 
     Flips cannot repair a flat triangle whose longest side is a feature, so that side has to be split first.
     """
@@ -73,7 +73,7 @@ def split_pass(
     mesh: EditableMesh,
     features: Features,
 ) -> int:
-    """Split the candidates, half-edges, that are longer than their limit, at the given ratios; returns how many."""
+    """Split the candidates, half-edges, that are longer than their limit at `ratios`; returns how many."""
     done = 0
     for i in range(len(candidates)):
         h = candidates[i]
@@ -105,7 +105,7 @@ def _corner_normal(p: Vectors, a: int, b: int, c: int) -> tuple[float, float, fl
 
 
 @kernel
-def _shape(p: Vectors, a: int, b: int, c: int) -> float:
+def shape_of(p: Vectors, a: int, b: int, c: int) -> float:
     """1 for an equilateral triangle, 0 for a degenerate one."""
     x, y, z = _corner_normal(p, a, b, c)
     total = 0.0
@@ -118,7 +118,7 @@ def _shape(p: Vectors, a: int, b: int, c: int) -> float:
 
 @kernel
 def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: Vectors) -> bool:
-    """Whether vertex v may move to `target` (3,) without turning over or flattening a face that lacks vertex `avoid`."""
+    """Whether v may move to `target` (3,): turns over or flattens no face but those of vertex `avoid`."""
     p, tail = mesh.position, mesh.tail
     old_x, old_y, old_z = p[v, 0], p[v, 1], p[v, 2]
     first = mesh.half_edge[v]
@@ -127,10 +127,10 @@ def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: V
         b, c = tail[next_of(h)], tail[prev_of(h)]
         if b != avoid and c != avoid:
             x, y, z = _corner_normal(p, v, b, c)
-            shape = _shape(p, v, b, c)
+            shape = shape_of(p, v, b, c)
             p[v, 0], p[v, 1], p[v, 2] = target[0], target[1], target[2]
             new_x, new_y, new_z = _corner_normal(p, v, b, c)
-            new_shape = _shape(p, v, b, c)
+            new_shape = shape_of(p, v, b, c)
             p[v, 0], p[v, 1], p[v, 2] = old_x, old_y, old_z
             if new_shape < _LEAST_SHAPE and new_shape <= shape:
                 return False
@@ -193,7 +193,7 @@ def _common_neighbours(a: int, b: int, mesh: EditableMesh) -> int:
 
 @kernel
 def _side_allows(h: int, mesh: EditableMesh) -> bool:
-    """Whether the face of h may vanish: its apex keeps faces enough, and its other sides are not both features."""
+    """Whether the face of h may vanish: its apex keeps faces enough, its other sides are not features both."""
     if mesh.crease[next_of(h)] >= 0 and mesh.crease[prev_of(h)] >= 0:
         return False
     count, closed = face_count_at(mesh.tail[prev_of(h)], mesh)
@@ -207,9 +207,8 @@ def keeps_topology(h: int, mesh: EditableMesh) -> bool:
     a, b = mesh.tail[h], mesh.tail[next_of(h)]
     if not _side_allows(h, mesh):
         return False
-    if g >= 0:
-        if not _side_allows(g, mesh) or mesh.tail[prev_of(h)] == mesh.tail[prev_of(g)]:
-            return False
+    if g >= 0 and (not _side_allows(g, mesh) or mesh.tail[prev_of(h)] == mesh.tail[prev_of(g)]):
+        return False
     return _common_neighbours(a, b, mesh) == (2 if g >= 0 else 1)
 
 
@@ -233,7 +232,7 @@ def _farthest_neighbour(v: int, avoid: int, target: Vectors, mesh: EditableMesh)
 def try_collapse(
     h: int, longest: float, target: Vectors, mesh: EditableMesh, features: Features, normals: Vectors
 ) -> bool:
-    """Collapse the edge of h if that is allowed and makes no edge longer than `longest`; target is scratch, (3,)."""
+    """Collapse the edge of h if allowed and if no edge gets longer than `longest`; target (3,) is scratch."""
     a, b = mesh.tail[h], mesh.tail[next_of(h)]
     chain_a, chain_b, along = mesh.chain[a], mesh.chain[b], mesh.crease[h]
     if chain_a != FREE and chain_b != FREE and (along < 0 or (chain_a < FREE and chain_b < FREE)):
@@ -275,18 +274,15 @@ def collapse_pass(
     candidates: Indices,
     limit: float,
     longest: float,
-    most: int,
     mesh: EditableMesh,
     features: Features,
     normals: Vectors,
 ) -> int:
-    """Collapse up to `most` of the candidates, half-edges, that are shorter than `limit`; returns how many."""
+    """Collapse the candidates, half-edges, that are shorter than `limit`; returns how many."""
     done = 0
     target = np.empty(3)
     for i in range(len(candidates)):
         h = candidates[i]
-        if done >= most:
-            break
         if mesh.tail[h] < 0 or edge_length_of(h, mesh) >= limit:
             continue
         if try_collapse(h, longest, target, mesh, features, normals):
@@ -314,10 +310,10 @@ def _may_flip(h: int, mesh: EditableMesh, normals: Vectors) -> bool:
     ox, oy, oz = _corner_normal(p, a, b, c)
     ex, ey, ez = _corner_normal(p, b, a, d)
     old = np.sqrt(ox * ox + oy * oy + oz * oz) * np.sqrt(ex * ex + ey * ey + ez * ez)
-    worst_old = min(_shape(p, a, b, c), _shape(p, b, a, d))
+    worst_old = min(shape_of(p, a, b, c), shape_of(p, b, a, d))
     if worst_old > _LEAST_SHAPE and ox * ex + oy * ey + oz * ez < _LEAST_COSINE * old:
         return False
-    if min(_shape(p, a, d, c), _shape(p, d, b, c)) <= min(worst_old, _LEAST_SHAPE):
+    if min(shape_of(p, a, d, c), shape_of(p, d, b, c)) <= min(worst_old, _LEAST_SHAPE):
         return False
     sx, sy, sz = ox + ex, oy + ey, oz + ez
     mean = np.sqrt(sx * sx + sy * sy + sz * sz)
@@ -333,8 +329,34 @@ def _may_flip(h: int, mesh: EditableMesh, normals: Vectors) -> bool:
 
 
 @kernel
-def flip_pass(mesh: EditableMesh, normals: Vectors) -> int:
-    """Flip the edges, features excepted, whose opposite angles sum to more than π; returns how many."""
+def face_shapes(mesh: EditableMesh) -> Vectors:
+    """`shape_of` each face, 1 for what is gone."""
+    shape = np.ones(mesh.count[1])
+    for f in range(len(shape)):
+        a, b, c = mesh.tail[3 * f], mesh.tail[3 * f + 1], mesh.tail[3 * f + 2]
+        if a >= 0:
+            shape[f] = shape_of(mesh.position, a, b, c)
+    return shape
+
+
+@kernel
+def valence_excess(mesh: EditableMesh) -> Indices:
+    """Edges at each vertex beyond the six of a regular one, four at a boundary; int32 (n,)."""
+    excess = np.zeros(len(mesh.half_edge), np.int32)
+    for v in range(mesh.count[0]):
+        if mesh.half_edge[v] >= 0:
+            count, closed = face_count_at(v, mesh)
+            excess[v] = count - 6 if closed else count - 3
+    return excess
+
+
+@kernel
+def flip_pass(mesh: EditableMesh, normals: Vectors, excess: Indices, regularity: float) -> int:
+    """Flip inner edges that are not Delaunay or whose flip makes valences regular; returns how many.
+
+    An edge is flipped where cot α + cot β of the opposite angles is below `regularity` times half the
+    decrease of the sum of squares of `excess`, which is brought up to date.
+    """
     p, tail = mesh.position, mesh.tail
     done = 0
     for h in range(3 * mesh.count[1]):
@@ -342,19 +364,24 @@ def flip_pass(mesh: EditableMesh, normals: Vectors) -> int:
         if tail[h] < 0 or g < h or mesh.crease[h] >= 0:
             continue
         a, b, c, d = tail[h], tail[g], tail[prev_of(h)], tail[prev_of(g)]
-        if _cotangent(p, c, a, b) + _cotangent(p, d, b, a) < -1e-9 and _may_flip(h, mesh, normals):
+        gain = 0
+        for v, change in ((a, -1), (b, -1), (c, 1), (d, 1)):
+            if mesh.chain[v] >= FREE:
+                gain -= 2 * change * excess[v] + 1
+        cotangents = _cotangent(p, c, a, b) + _cotangent(p, d, b, a)
+        if cotangents < 0.5 * regularity * gain - 1e-9 and _may_flip(h, mesh, normals):
             flip_edge(h, mesh)
+            excess[a] -= 1
+            excess[b] -= 1
+            excess[c] += 1
+            excess[d] += 1
             done += 1
     return done
 
 
-def flip_to_delaunay(mesh: EditableMesh, normals: Vectors, passes: int) -> None:
-    """Flip until nothing changes, or for that many passes."""
+def flip_edges(mesh: EditableMesh, normals: Vectors, passes: int, regularity: float = 0.0) -> None:
+    """Flip until nothing changes, or for that many passes; see `flip_pass`."""
+    excess = valence_excess(mesh)
     for _ in range(passes):
-        if flip_pass(mesh, normals) == 0:
+        if flip_pass(mesh, normals, excess, regularity) == 0:
             return
-
-
-def candidates_of(length: Vectors, chosen: NDArray[np.bool_], random: np.random.Generator) -> Indices:
-    """The chosen half-edges in random order."""
-    return random.permutation(np.flatnonzero(chosen & (length >= 0)).astype(np.int32))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.connectivity import FREE, EditableMesh
@@ -36,7 +35,7 @@ def fan_normals(mesh: EditableMesh) -> Vectors:
 
 @kernel
 def arcs_beside(v: int, mesh: EditableMesh, features: Features) -> tuple[float, float]:
-    """Arc lengths of the two neighbours of v, which is on a chain, along that chain; the smaller one first."""
+    """Arc lengths of the two neighbours of v along the chain that it is on, the smaller one first."""
     chain = mesh.chain[v]
     low, high = np.inf, -np.inf
     first = mesh.half_edge[v]
@@ -64,7 +63,7 @@ def smooth(
     goal: Vectors,
     arc: Vectors,
 ) -> None:
-    """Write to `goal` (n, 3) where each free vertex should go in its tangent plane, to `arc` where each one on a chain.
+    """Write to `goal` (n, 3) where free vertices should go in their tangent planes, to `arc` those on chains.
 
     A mix of the mean of its neighbours and of springs of the length `edge_length`, with the weight `spring`.
     """
@@ -101,25 +100,18 @@ def smooth(
 
 @kernel
 def apply_moves(
-    mesh: EditableMesh,
-    features: Features,
-    normals: Vectors,
-    goal: Vectors,
-    arc: Vectors,
-    allowed: NDArray[np.bool_],
-) -> int:
-    """Move each vertex to its goal, where that turns no face over; returns how many stayed."""
+    mesh: EditableMesh, features: Features, normals: Vectors, goal: Vectors, arc: Vectors
+) -> None:
+    """Move each vertex to its goal, where that turns no face over and keeps the order along its chain."""
     p = mesh.position
     target = np.empty(3)
-    stayed = 0
     for v in range(mesh.count[0]):
         chain = mesh.chain[v]
-        if chain < FREE or not allowed[v]:
+        if chain < FREE:
             continue
         if chain >= 0:
             before, after = arcs_beside(v, mesh, features)
             if not before < arc[v] < after:
-                stayed += 1
                 continue
             place_on_chain(chain, arc[v], features.offset, features.arc, features.point, target)
         else:
@@ -130,6 +122,3 @@ def apply_moves(
                 p[v, axis] = target[axis]
             if chain >= 0:
                 mesh.arc[v] = arc[v]
-        else:
-            stayed += 1
-    return stayed
