@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from weathercoat.mesh.surface import Vectors
 
-_HALF_ANGLE = np.radians(13.0)  # of the picture's shorter side: a long lens, which keeps plates from looking warped
+_HALF_ANGLE = np.radians(
+    13.0
+)  # of the picture's shorter side: a long lens, which keeps plates from looking warped
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Camera:
     def directions(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64], width: int, height: int
     ) -> NDArray[np.float32]:
-        """Directions, not of unit length, through the centres of the pixels at `rows` x `columns`, (rows * columns, 3)."""
+        """Directions, not of unit length, through pixels at `rows` x `columns`, (rows * columns, 3)."""
         x = ((columns + 0.5) / width * 2.0 - 1.0) * self.tangent_x
         y = (1.0 - (rows + 0.5) / height * 2.0) * self.tangent_y
         direction = np.empty((len(rows), len(columns), 3), np.float32)
@@ -61,11 +63,12 @@ def make_camera(
     elevation: float,
     margin: float,
 ) -> Camera:
-    """The camera that sees all `vertices`, as near as the `margin` (a share of the picture's half size) allows.
+    """The camera that sees all `vertices`, as near as the `margin` (a share of the picture's half size)
+    allows.
 
-    An object is seen from `azimuth` and `elevation` [degrees]: azimuth 0 is its front (+z where y is up, -y where z is
-    up), positive azimuths lie to its right. A plate, open or closed, is seen from its normal side, turned by the same
-    azimuth and from a little above, so that its curls show.
+    An object is seen from `azimuth` and `elevation` [degrees]: azimuth 0 is its front (+z where y is up, -y
+    where z is up), positive azimuths lie to its right. A plate, open or closed, is seen from its normal side,
+    turned by the same azimuth and from a little above, so that its curls show.
     """
     upward = _unit(np.asarray(up, np.float64))
     front = _front(upward)
@@ -91,7 +94,7 @@ def _unit(vector: Vectors) -> Vectors:
 
 
 def _facing(normals: Vectors, preferred: Vectors) -> Vectors | None:
-    """The direction that most of a plate's surface faces (`preferred` decides between two sides); None if it is no plate."""
+    """The side that a plate faces (`preferred` decides between two alike); None for what is no plate."""
     if len(normals) == 0:
         return None
     share, axes = np.linalg.eigh(normals.T @ normals / len(normals))
@@ -108,14 +111,18 @@ def _front(upward: Vectors) -> Vectors:
     return _unit(guess - (guess @ upward) * upward)
 
 
-def _turned_from(facing: Vectors, upward: Vectors, front: Vectors, azimuth: float, elevation: float) -> Vectors:
-    """Direction to the viewer of a surface that faces `facing`: three-quarter, from above where it stands upright."""
+def _turned_from(
+    facing: Vectors, upward: Vectors, front: Vectors, azimuth: float, elevation: float
+) -> Vectors:
+    """Direction to the viewer of a plate that faces `facing`: three-quarter, a little from above."""
     steep = abs(facing @ upward)
     if steep > 0.9:
         # Lying flat: from the front, high enough that the surface is not foreshortened away.
         a, e = np.radians(azimuth), np.radians(max(2.0 * elevation, 42.0))
         side = np.cross(upward, front)
-        return np.cos(e) * (np.cos(a) * front + np.sin(a) * side) + np.sin(e) * np.sign(facing @ upward) * upward
+        return (
+            np.cos(e) * (np.cos(a) * front + np.sin(a) * side) + np.sin(e) * np.sign(facing @ upward) * upward
+        )
     level = _unit(facing - (facing @ upward) * upward)
     side = np.cross(upward, level)
     a = np.radians(azimuth)
@@ -124,11 +131,14 @@ def _turned_from(facing: Vectors, upward: Vectors, front: Vectors, azimuth: floa
     return np.cos(e) * turned + np.sin(e) * upward  # type: ignore[no-any-return]
 
 
-def _fit(vertices: Vectors, right: Vectors, up: Vectors, forward: Vectors, tan_x: float, tan_y: float) -> Vectors:
+def _fit(
+    vertices: Vectors, right: Vectors, up: Vectors, forward: Vectors, tan_x: float, tan_y: float
+) -> Vectors:
     """The nearest position from which all vertices lie within the angle of view.
 
-    Each side of the view is a plane through the camera; a vertex is inside when its signed distance is not positive. The
-    extreme vertex of each side gives that plane's place, and two opposite planes meet at the greatest depth possible.
+    Each side of the view is a plane through the camera; a vertex is inside when its signed distance is not
+    positive. The extreme vertex of each side gives that plane's place, and two opposite planes meet at the
+    greatest depth possible.
     """
     depth = vertices @ forward
     centre, nearest = [], []

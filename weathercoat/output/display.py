@@ -1,4 +1,6 @@
-"""`DisplayMesh`: everything of one snapshot that a picture shows, as one triangle mesh in units of the object's size."""
+"""`DisplayMesh`: everything of one snapshot that a picture shows, as one triangle mesh in units of the
+object's size.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from weathercoat.output.shading import BACK, BARE_PART, FRONT, METAL, RIM
 from weathercoat.output.shell import corner_normals, make_shell, open_edges, smooth_outline
 from weathercoat.sim.snapshot import Snapshot
 
-_GAP = 0.25  # of the film's thickness: the film floats this far above the metal, so that no two surfaces coincide
+_GAP = 0.25  # of the film's thickness: it floats this far above the metal, so that no two surfaces coincide
 _BEVEL = 0.4  # of the film's thickness
 _OUTLINE_PASSES = 1
 _FILM_CREASE = np.radians(60.0)  # curls on coarse meshes turn by more than a crease of the metal does
@@ -22,7 +24,7 @@ _METAL_CREASE = np.radians(45.0)
 
 @dataclass(frozen=True)
 class Normalisation:
-    """Model units to display units: (x - centre) / size, with size the square root of the substrate's area."""
+    """Model units to display units: (x - centre) / size, with size the root of the substrate's area."""
 
     centre: Vectors
     size: float
@@ -44,8 +46,8 @@ class DisplayMesh:
     """One triangle mesh of k vertices and t faces with what the shading needs.
 
     vertices (k, 3); faces int32 (t, 3); kind uint8 (t,), see `shading`; corner_normals float32 (t, 3, 3).
-    rest (k, 3), the position at rest; stain, dust, rust (k,), 0 to 1: runoff rust on the film, dust, rust of the metal;
-    layer (k,), 1 on the film's front and 0 on its back; color (k, 3), linear colour of the paint.
+    rest (k, 3), the position at rest; stain, dust, rust (k,), 0 to 1: runoff rust on the film, dust, rust of
+    the metal; layer (k,), 1 on the film's front and 0 on its back; color (k, 3), linear colour of the paint.
     """
 
     vertices: Vectors
@@ -62,20 +64,35 @@ class DisplayMesh:
     def at(self, face: Indices, weights: NDArray[np.float32]) -> Samples:
         """The points on `face` (s,) with `weights` (s, 2) of its second and third corner."""
         samples = Samples(
-            self.kind[face], *(np.empty((len(face), 3)) for _ in range(5)), *(np.empty(len(face)) for _ in range(4))
+            self.kind[face],
+            *(np.empty((len(face), 3)) for _ in range(5)),
+            *(np.empty(len(face)) for _ in range(4)),
         )
         vectors = np.stack([self.vertices, self.rest, self.color], axis=1)
         scalars = np.stack([self.stain, self.dust, self.rust, self.layer], axis=1)
         _interpolate(
-            face, weights, self.faces, vectors, scalars, self.corner_normals, samples.position, samples.rest,
-            samples.color, samples.facet, samples.normal, samples.stain, samples.dust, samples.rust, samples.layer,
-        )  # fmt: skip
+            face,
+            weights,
+            self.faces,
+            vectors,
+            scalars,
+            self.corner_normals,
+            samples.position,
+            samples.rest,
+            samples.color,
+            samples.facet,
+            samples.normal,
+            samples.stain,
+            samples.dust,
+            samples.rust,
+            samples.layer,
+        )
         return samples
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Points of a display mesh: `kind` (s,), vectors (s, 3), with `facet` the normal of the face, and scalars (s,)."""
+    """Points of a display mesh: kind (s,), vectors (s, 3), scalars (s,); `facet` is the face normal."""
 
     kind: NDArray[np.uint8]
     position: Vectors
@@ -141,13 +158,17 @@ def _metal(snapshot: Snapshot, rest: Vectors, thickness: float) -> DisplayMesh:
     return _part(shell.vertices, everything, METAL, _METAL_CREASE, doubled)
 
 
-def _film(snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors) -> list[DisplayMesh]:
+def _film(
+    snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors
+) -> list[DisplayMesh]:
     """Front, back and rim of the film."""
     origin = snapshot.film_origin
     fixed = np.bincount(origin, minlength=len(rest)) > 2
     fixed[open_edges(snapshot.substrate_faces)[0]] = True
     vertices = smooth_outline(vertices, snapshot.film_faces, fixed[origin], _OUTLINE_PASSES)
-    shell = make_shell(vertices, snapshot.film_faces, thickness, gap=_GAP * thickness, bevel=_BEVEL * thickness)
+    shell = make_shell(
+        vertices, snapshot.film_faces, thickness, gap=_GAP * thickness, bevel=_BEVEL * thickness
+    )
     color = np.broadcast_to(paint, (len(vertices), 3))
     scalars = {
         "rest": np.tile(rest[origin], (2, 1)),
@@ -174,7 +195,23 @@ def _joined(parts: list[DisplayMesh]) -> DisplayMesh:
 
 
 @kernel
-def _interpolate(face, weights, faces, vectors, scalars, corner_normals, position, rest, color, facet, normal, stain, dust, rust, layer):  # type: ignore[no-untyped-def]
+def _interpolate(
+    face: Indices,
+    weights: NDArray[np.float32],
+    faces: Indices,
+    vectors: Vectors,
+    scalars: Vectors,
+    corner_normals: NDArray[np.float32],
+    position: Vectors,
+    rest: Vectors,
+    color: Vectors,
+    facet: Vectors,
+    normal: Vectors,
+    stain: Vectors,
+    dust: Vectors,
+    rust: Vectors,
+    layer: Vectors,
+) -> None:
     for s in range(len(face)):
         f = face[s]
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -184,7 +221,9 @@ def _interpolate(face, weights, faces, vectors, scalars, corner_normals, positio
             position[s, x] = u * vectors[a, 0, x] + v * vectors[b, 0, x] + w * vectors[c, 0, x]
             rest[s, x] = u * vectors[a, 1, x] + v * vectors[b, 1, x] + w * vectors[c, 1, x]
             color[s, x] = u * vectors[a, 2, x] + v * vectors[b, 2, x] + w * vectors[c, 2, x]
-            normal[s, x] = u * corner_normals[f, 0, x] + v * corner_normals[f, 1, x] + w * corner_normals[f, 2, x]
+            normal[s, x] = (
+                u * corner_normals[f, 0, x] + v * corner_normals[f, 1, x] + w * corner_normals[f, 2, x]
+            )
         stain[s] = u * scalars[a, 0] + v * scalars[b, 0] + w * scalars[c, 0]
         dust[s] = u * scalars[a, 1] + v * scalars[b, 1] + w * scalars[c, 1]
         rust[s] = u * scalars[a, 2] + v * scalars[b, 2] + w * scalars[c, 2]

@@ -28,8 +28,8 @@ def ground_shadow(
 ) -> NDArray[np.float64]:
     """What the background of each pixel is multiplied by, (height, width): 1 on open ground, less in shadow.
 
-    wanted (height, width): the pixels where the background shows. The ground is the plane at `level` along `up`; it ends
-    softly at `radius` round the origin, and is not there for a camera that lies below it.
+    wanted (height, width): the pixels where the background shows. The ground is the plane at `level` along
+    `up`; it ends softly at `radius` round the origin, and is not there for a camera that lies below it.
     """
     height, width = wanted.shape
     factor = np.ones(wanted.shape)

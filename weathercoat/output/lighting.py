@@ -1,4 +1,4 @@
-"""How much key light and sky reaches each sample: a few rays from fixed patterns, then a filter that respects edges."""
+"""How much key light and sky reaches each sample: a few rays, then a filter that respects edges."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.surface import Indices, Vectors
 from weathercoat.output.rays import RayQueries
 from weathercoat.output.shading import add_sky
 
 _SUN_RADIUS = 0.09  # radians: soft enough to read as a shadow of something near
-_STRATA = 16  # neighbouring samples share one set of directions: each 4 x 4 block covers the hemisphere evenly
+_STRATA = (
+    16  # neighbouring samples share one set of directions: each 4 x 4 block covers the hemisphere evenly
+)
 _LIFT = 3e-4  # start of a ray above its surface, in sizes
 
 
@@ -28,10 +31,11 @@ def gather_light(
     key_rays: int,
     reach: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The visible share of the key light (s,) and the mean radiance of the sky over the cosine-weighted hemisphere (s, 3).
+    """The visible share of the key light (s,) and the mean radiance of the sky over the cosine-weighted
+    hemisphere (s, 3).
 
-    position, facet (the face's normal), normal (the shading normal): (s, 3), for samples in the pixels at `row`, `column`.
-    Sky is blocked by what lies within `reach`.
+    position, facet (the face's normal), normal (the shading normal): (s, 3), for samples in the pixels at
+    `row`, `column`. Sky is blocked by what lies within `reach`.
     """
     count = len(position)
     origins = (position + _LIFT * facet).astype(np.float32)
@@ -47,9 +51,13 @@ def gather_light(
 
 
 @kernel
-def _hash(a, b, c):  # type: ignore[no-untyped-def]
+def _hash(a: int, b: int, c: int) -> float:
     """A fixed value in [0, 1) for three integers (murmur3's finaliser)."""
-    h = (np.uint32(a) * np.uint32(0x9E3779B1)) ^ (np.uint32(b) * np.uint32(0x85EBCA77)) ^ (np.uint32(c) * np.uint32(0xC2B2AE3D))
+    h = (
+        (np.uint32(a) * np.uint32(0x9E3779B1))
+        ^ (np.uint32(b) * np.uint32(0x85EBCA77))
+        ^ (np.uint32(c) * np.uint32(0xC2B2AE3D))
+    )
     h = np.uint32(h ^ (h >> np.uint32(16)))
     h = np.uint32(h * np.uint32(0x85EBCA6B))
     h = np.uint32(h ^ (h >> np.uint32(13)))
@@ -58,8 +66,9 @@ def _hash(a, b, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _stratified(row, column, index, total, out):  # type: ignore[no-untyped-def]
-    """A point of the unit square: point `index` of the sample's own set of an R2 sequence, jittered; to `out` (2,).
+def _stratified(row: int, column: int, index: int, total: int, out: Vectors) -> None:
+    """A point of the unit square: point `index` of the sample's own set of an R2 sequence, jittered; to `out`
+    (2,).
 
     Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
     """
@@ -71,8 +80,8 @@ def _stratified(row, column, index, total, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _frame(n, t, b):  # type: ignore[no-untyped-def]
-    """Two unit vectors that complete n to a frame (Duff et al., Building an orthonormal basis, revisited, 2017)."""
+def _frame(n: Vectors, t: Vectors, b: Vectors) -> None:
+    """Two unit vectors that complete n to a frame (Duff et al., Orthonormal basis, revisited, 2017)."""
     sign = 1.0 if n[2] >= 0.0 else -1.0
     p = -1.0 / (sign + n[2])
     q = n[0] * n[1] * p
@@ -81,7 +90,15 @@ def _frame(n, t, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sky_directions(row, column, facet, normal, index, total, out):  # type: ignore[no-untyped-def]
+def sky_directions(
+    row: Indices,
+    column: Indices,
+    facet: Vectors,
+    normal: Vectors,
+    index: int,
+    total: int,
+    out: NDArray[np.float32],
+) -> None:
     """A cosine-distributed direction for each sample, (s, 3), never under its face."""
     t, b, point = np.empty(3), np.empty(3), np.empty(2)
     for i in range(len(row)):
@@ -99,7 +116,9 @@ def sky_directions(row, column, facet, normal, index, total, out):  # type: igno
 
 
 @kernel
-def key_directions(row, column, key, index, total, out):  # type: ignore[no-untyped-def]
+def key_directions(
+    row: Indices, column: Indices, key: Vectors, index: int, total: int, out: NDArray[np.float32]
+) -> None:
     """A direction within the key light's disc for each sample, (s, 3)."""
     t, b, point = np.empty(3), np.empty(3), np.empty(2)
     _frame(key, t, b)
@@ -113,13 +132,23 @@ def key_directions(row, column, key, index, total, out):  # type: ignore[no-unty
 
 
 @kernel
-def share_samples(sample, face, weights, vertices, faces, kind, factor, tolerance, leader):  # type: ignore[no-untyped-def]
+def share_samples(
+    sample: Indices,
+    face: Indices,
+    weights: NDArray[np.float32],
+    vertices: Vectors,
+    faces: Indices,
+    kind: NDArray[np.uint8],
+    factor: int,
+    tolerance: float,
+    leader: Indices,
+) -> None:
     """Let the samples of a pixel that lie on one smooth surface share their light and colour.
 
-    sample int32 (height, width): the number of the sample at each place, -1 where there is none; a pixel is a square of
-    `factor` samples a side. face (s,), weights (s, 2): where the samples lie on the mesh; kind (t,) of its faces.
-    `leader` (s,) gets the number of the sample to use in place of each: the first of its pixel that has the same kind,
-    turns by less than 14 degrees, and lies within `tolerance` of its plane.
+    sample int32 (height, width): the number of the sample at each place, -1 where there is none; a pixel is a
+    square of `factor` samples a side. face (s,), weights (s, 2): where the samples lie on the mesh; kind (t,)
+    of its faces. `leader` (s,) gets the number of the sample to use in place of each: the first of its pixel
+    that has the same kind, turns by less than 14 degrees, and lies within `tolerance` of its plane.
     """
     height, width = sample.shape
     position, facet = np.empty((len(face), 3)), np.empty((len(face), 3))
@@ -153,11 +182,25 @@ def share_samples(sample, face, weights, vertices, faces, kind, factor, toleranc
 
 
 @kernel
-def filter_light(sample, stride, row, column, position, facet, tolerance, lit, sky, out_lit, out_sky):  # type: ignore[no-untyped-def]
-    """Average the light of each sample with its neighbours, `stride` places apart, that lie on the same surface.
+def filter_light(
+    sample: Indices,
+    stride: int,
+    row: Indices,
+    column: Indices,
+    position: Vectors,
+    facet: Vectors,
+    tolerance: float,
+    lit: Vectors,
+    sky: Vectors,
+    out_lit: Vectors,
+    out_sky: Vectors,
+) -> None:
+    """Average the light of each sample with its neighbours, `stride` places apart, that lie on the same
+    surface.
 
-    sample int32 (height, width): the number of the sample at each place, -1 where there is none. A neighbour counts when
-    the two facets turn by less than 45 degrees and it lies within `tolerance` of the sample's plane.
+    sample int32 (height, width): the number of the sample at each place, -1 where there is none. A neighbour
+    counts when the two facets turn by less than 45 degrees and it lies within `tolerance` of the sample's
+    plane.
     """
     height, width = sample.shape
     for i in range(len(row)):
@@ -179,7 +222,7 @@ def filter_light(sample, stride, row, column, position, facet, tolerance, lit, s
                     away += facet[i, axis] * (position[j, axis] - position[i, axis])
                 if cosine < 0.7 or abs(away) > tolerance:
                     continue
-                # The outer ring counts half, which makes the window four samples wide: one full set of directions.
+                # The outer ring counts half, so the window is four samples wide: one full set of directions.
                 w = (0.5 if abs(dx) == 2 else 1.0) * (0.5 if abs(dy) == 2 else 1.0)
                 weight += w
                 light += w * lit[j]

@@ -19,7 +19,20 @@ from weathercoat.output.display import DisplayMesh, Normalisation, make_display_
 from weathercoat.output.ground import ground_shadow
 from weathercoat.output.lighting import filter_light, gather_light, share_samples
 from weathercoat.output.rays import RayQueries, make_rays
-from weathercoat.output.shading import shade, to_linear, to_srgb
+from weathercoat.output.shading import (
+    DUST,
+    PRIMER,
+    RUST_BODY,
+    RUST_CORE,
+    RUST_RIM,
+    STAIN,
+    STAIN_DEPTH,
+    STEEL,
+    UNPAINTED,
+    shade,
+    to_linear,
+    to_srgb,
+)
 from weathercoat.sim.snapshot import Snapshot
 
 Image = NDArray[np.uint8]
@@ -31,12 +44,13 @@ _Y_UP = (0.0, 1.0, 0.0)
 
 @dataclass(frozen=True)
 class PictureParameters:
-    """How a picture is taken. Colours are sRGB, 0 to 1; lengths are in sizes (square roots of the substrate's area).
+    """How a picture is taken. Colours are sRGB, 0 to 1; lengths are in sizes (square roots of the substrate's
+    area).
 
-    width, height: pixels. azimuth, elevation: degrees of the view, see `camera.make_camera`; margin: share of half the
-    picture that stays free on each side. samples: side of the square of samples in each pixel; sky_rays, key_rays: rays
-    for each sample towards the sky and the key light; reach: distance within which things block the sky.
-    Colours are those of clean materials: the stains come from the snapshot's scalars.
+    width, height: pixels. azimuth, elevation: degrees of the view, see `camera.make_camera`; margin: share of
+    half the picture that stays free on each side. samples: side of the square of samples in each pixel;
+    sky_rays, key_rays: rays for each sample towards the sky and the key light; reach: distance within which
+    things block the sky. Colours are those of clean materials: the stains come from the snapshot's scalars.
     """
 
     width: int = 520
@@ -64,11 +78,11 @@ class PictureParameters:
 
 _KEY = 2.75 * np.array([1.0, 0.95, 0.87])
 _SAME_SURFACE = 0.004  # distance from a plane, in sizes, within which samples count as one surface
-_STAIN_ABSORPTION = np.array([0.35, 1.1, 2.2])  # optical depth of a full stain in red, green and blue
+_STAIN_DEPTH = np.array([0.35, 1.1, 2.2])  # a stain takes away blue first
 
 
 def frame_camera(snapshot: Snapshot, parameters: PictureParameters, *, up: Axis = _Y_UP) -> Camera:
-    """The camera that frames a snapshot's substrate, and so the same for every snapshot of a run, in display units."""
+    """The camera, in display units, that frames a snapshot's substrate: the same for all of a run."""
     vertices = Normalisation.of(snapshot)(snapshot.substrate_vertices)
     return make_camera(
         vertices,
@@ -91,8 +105,8 @@ def render_snapshot(
 ) -> Image:
     """A picture of a snapshot, uint8 (height, width, 3).
 
-    up: unit vector against gravity, in the model's axes; untouched: parts of the model that carry no paint, in its units;
-    camera: one of `frame_camera`, which is also the default.
+    up: unit vector against gravity, in the model's axes; untouched: parts of the model that carry no paint,
+    in its units; camera: one of `frame_camera`, which is also the default.
     """
     camera = camera or frame_camera(snapshot, parameters, up=up)
     normalise = Normalisation.of(snapshot)
@@ -110,16 +124,23 @@ def render_snapshot(
     face, weights = _first_hits(rays, mesh, camera, width, height)
     seen = np.flatnonzero(face >= 0)
     upward = np.asarray(up, np.float64)
-    key = key_direction(camera, upward)
-    color = _shaded(rays, mesh, face[seen], weights[seen], seen, camera, upward, key, parameters, width, height)
+    key = _key_direction(camera, upward)
+    light = _Light(key, upward, parameters)
+    color = _shaded(rays, mesh, face[seen], weights[seen], seen, (height, width), camera.position, light)
     picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
     coverage = _pixel_means((face >= 0).astype(np.float32).reshape(height, width, 1), factor)
     placed = normalise(snapshot.substrate_vertices)
     shadow = ground_shadow(
-        rays, camera, coverage[:, :, 0] < 1.0, up=upward, level=float((placed @ upward).min()) - parameters.metal_thickness,
-        radius=1.6 * float(np.linalg.norm(placed, axis=1).max()), key=key, reach=parameters.reach,
-    )  # fmt: skip
+        rays,
+        camera,
+        coverage[:, :, 0] < 1.0,
+        up=upward,
+        level=float((placed @ upward).min()) - parameters.metal_thickness,
+        radius=1.6 * float(np.linalg.norm(placed, axis=1).max()),
+        key=key,
+        reach=parameters.reach,
+    )
     background = (1.0 - coverage) * shadow[:, :, None] * to_linear(parameters.background)
     return to_srgb(_pixel_means(picture.reshape(height, width, 3), factor) + background)
 
@@ -135,7 +156,7 @@ def _pixel_means(samples: NDArray[np.float32], factor: int) -> NDArray[np.float3
 def _first_hits(
     rays: RayQueries, mesh: DisplayMesh, camera: Camera, width: int, height: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """The face that each sample of the picture shows, and where on it; a band of rows at a time, to bound the memory."""
+    """The face that each sample shows, and where on it; bands of rows bound the memory."""
     face = np.full((height, width), -1, np.int32)
     weights = np.empty((height, width, 2), np.float32)
     rows, columns = camera.window(mesh.vertices, width, height)
@@ -152,22 +173,29 @@ def _first_hits(
     return face.ravel(), weights.reshape(-1, 2)
 
 
+@dataclass(frozen=True)
+class _Light:
+    """Directions towards the key light and up, and the parameters of the picture."""
+
+    key: Vectors
+    up: Vectors
+    parameters: PictureParameters
+
+
 def _shaded(
     rays: RayQueries,
     mesh: DisplayMesh,
     face: NDArray[np.int32],
     weights: NDArray[np.float32],
     seen: NDArray[np.int64],
-    camera: Camera,
-    up: Vectors,
-    key: Vectors,
-    parameters: PictureParameters,
-    width: int,
-    height: int,
+    shape: tuple[int, int],
+    eye: Vectors,
+    light: _Light,
 ) -> NDArray[np.float32]:
-    """Tone-mapped linear colours (s, 3) of the points on `face` (s,) with `weights` (s, 2), at `seen` in the picture."""
+    """Tone-mapped linear colours (s, 3) of the points on `face`, at `seen` in a picture of `shape`."""
+    parameters, width = light.parameters, shape[1]
     factor = parameters.samples
-    number = np.full((height, width), -1, np.int32)
+    number = np.full(shape, -1, np.int32)
     number.ravel()[seen] = np.arange(len(seen), dtype=np.int32)
     leader = np.empty(len(seen), np.int32)
     share_samples(number, face, weights, mesh.vertices, mesh.faces, mesh.kind, factor, _SAME_SURFACE, leader)
@@ -177,35 +205,51 @@ def _shaded(
     s = mesh.at(face[leaders], weights[leaders])
     row, column = (seen[leaders] // width).astype(np.int32), (seen[leaders] % width).astype(np.int32)
     lit, sky = gather_light(
-        rays, row // factor, column // factor, s.position, s.facet, s.normal,
-        key=key, up=up, sky_rays=parameters.sky_rays, key_rays=parameters.key_rays, reach=parameters.reach,
-    )  # fmt: skip
+        rays,
+        row // factor,
+        column // factor,
+        s.position,
+        s.facet,
+        s.normal,
+        key=light.key,
+        up=light.up,
+        sky_rays=parameters.sky_rays,
+        key_rays=parameters.key_rays,
+        reach=parameters.reach,
+    )
     smooth_lit, smooth_sky = np.empty_like(lit), np.empty_like(sky)
-    filter_light(number, factor, row, column, s.position, s.facet, _SAME_SURFACE, lit, sky, smooth_lit, smooth_sky)
+    filter_light(
+        number, factor, row, column, s.position, s.facet, _SAME_SURFACE, lit, sky, smooth_lit, smooth_sky
+    )
     color = np.empty((len(leaders), 3), np.float32)
     shade(
-        s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, camera.position,
-        key, _KEY, up, _palette(parameters), smooth_lit, smooth_sky, color,
+        s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, eye,
+        light.key, _KEY, light.up, _palette(parameters), smooth_lit, smooth_sky, color,
     )  # fmt: skip
     return color[follows]
 
 
-def key_direction(camera: Camera, up: Vectors) -> Vectors:
-    """Towards the key light: from the upper left, low over the surface that faces the camera, so that relief shows."""
+def _key_direction(camera: Camera, up: Vectors) -> Vectors:
+    """Towards the key light: from the upper left, low over what faces the camera, so that relief shows."""
     direction = -0.62 * camera.right + 0.62 * up - 0.45 * camera.forward
     return direction / np.linalg.norm(direction)  # type: ignore[no-any-return]
 
 
 def _palette(parameters: PictureParameters) -> Vectors:
     """The colours that `shade` reads, (9, 3), linear."""
-    p = parameters
-    palette = to_linear([p.primer, p.metal, p.rust_rim, p.rust_body, p.rust_core, p.stain, p.stain, p.dust, p.unpainted])
-    palette[6] = _STAIN_ABSORPTION
+    palette = np.empty((9, 3))
+    palette[PRIMER], palette[STEEL] = to_linear(parameters.primer), to_linear(parameters.metal)
+    palette[RUST_RIM], palette[RUST_BODY] = to_linear(parameters.rust_rim), to_linear(parameters.rust_body)
+    palette[RUST_CORE], palette[STAIN] = to_linear(parameters.rust_core), to_linear(parameters.stain)
+    palette[DUST], palette[UNPAINTED] = to_linear(parameters.dust), to_linear(parameters.unpainted)
+    palette[STAIN_DEPTH] = _STAIN_DEPTH
     return palette
 
 
 def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int) -> Image:
-    """Pictures of one size in rows of `columns`, each with a small label in its lower left corner; uint8 (h, w, 3)."""
+    """Pictures of one size in rows of `columns`, each with a small label in its lower left corner; uint8 (h,
+    w, 3).
+    """
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
@@ -213,11 +257,12 @@ def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int) 
     rows = -(-len(images) // columns)
     sheet = Pillow.new("RGB", (columns * width, rows * height), tuple(int(c) for c in images[0][0, 0]))
     draw = ImageDraw.Draw(sheet)
-    font = ImageFont.load_default(max(11, height // 28))
+    small = max(11, height // 28)
+    font = ImageFont.load_default(small)
     for index, (image, label) in enumerate(zip(images, labels, strict=True)):
         left, top = index % columns * width, index // columns * height
         sheet.paste(Pillow.fromarray(image), (left, top))
-        draw.text((left + height // 28, top + height - height // 14), label, fill=(88, 88, 86), font=font)
+        draw.text((left + small, top + height - 2 * small), label, fill=(88, 88, 86), font=font)
     return np.asarray(sheet)
 
 

@@ -1,4 +1,4 @@
-"""Ray queries on a triangle mesh: by Embree where its wheel is installed, else by a bounding volume tree of our own."""
+"""Ray queries on a mesh: by Embree where its wheel is installed, else by a tree of boxes of our own."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Floats = NDArray[np.float32]
 
 
 class RayQueries(Protocol):
-    """What pictures ask of a mesh. Origins and unit directions are float32 (r, 3), with a direction for each origin."""
+    """What pictures ask of a mesh; origins and directions are float32 (r, 3)."""
 
     def nearest(self, origins: Floats, directions: Floats) -> tuple[Indices, Floats]:
-        """The first face each ray meets, int32 (r,), -1 for none, and the weights of its second and third corner."""
+        """The first face each ray meets, int32 (r,), -1 for none; weights (r, 2) of its later corners."""
 
     def blocked(self, origins: Floats, directions: Floats, reach: float) -> NDArray[np.bool_]:
         """Whether each ray meets any face within `reach`, (r,)."""
@@ -31,7 +31,9 @@ class EmbreeRays:
 
         self._scene = EmbreeScene(robust=True)
         # Keep the mesh: Embree reads its buffers for as long as the scene lives.
-        self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
+        self._mesh = TriangleMesh(
+            self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32)
+        )
 
     def nearest(self, origins: Floats, directions: Floats) -> tuple[Indices, Floats]:
         hits = self._scene.run(origins, directions, output=1)

@@ -1,7 +1,9 @@
-"""Colour of a point of the picture: procedural paint, primer, steel and rust, lit by a sun, a sky and the ground.
+"""Colour of a point of the picture: procedural paint, primer, steel and rust, lit by a sun, a sky and the
+ground.
 
-Everything is in linear light and in units of the object's size (the square root of its area), so the pattern belongs to
-the paint and neither to the mesh nor to the picture. Positions are those at rest: the pattern moves with the film.
+Everything is in linear light and in units of the object's size (the square root of its area), so the pattern
+belongs to the paint and neither to the mesh nor to the picture. Positions are those at rest: the pattern
+moves with the film.
 """
 
 from __future__ import annotations
@@ -10,8 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.surface import Vectors
 
-FRONT, BACK, RIM, METAL, BARE_PART = 0, 1, 2, 3, 4
+# What a face shows.
+FRONT, BACK, RIM, METAL, BARE_PART = range(5)
+# Rows of the palette: colours, but for the optical depth of a full stain in red, green and blue.
+PRIMER, STEEL, RUST_RIM, RUST_BODY, RUST_CORE, STAIN, STAIN_DEPTH, DUST, UNPAINTED = range(9)
 
 
 def to_linear(srgb: object) -> NDArray[np.float64]:
@@ -28,9 +34,13 @@ def to_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 @kernel
-def _hash(i, j, k):  # type: ignore[no-untyped-def]
+def _hash(i: int, j: int, k: int) -> np.uint32:
     """32 fixed bits for an integer lattice point (murmur3's finaliser)."""
-    h = (np.uint32(i) * np.uint32(0x8DA6B343)) ^ (np.uint32(j) * np.uint32(0xD8163841)) ^ (np.uint32(k) * np.uint32(0xCB1AB31F))
+    h = (
+        (np.uint32(i) * np.uint32(0x8DA6B343))
+        ^ (np.uint32(j) * np.uint32(0xD8163841))
+        ^ (np.uint32(k) * np.uint32(0xCB1AB31F))
+    )
     h = np.uint32(h ^ (h >> np.uint32(16)))
     h = np.uint32(h * np.uint32(0x85EBCA6B))
     h = np.uint32(h ^ (h >> np.uint32(13)))
@@ -39,10 +49,12 @@ def _hash(i, j, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def gradient_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
-    """Gradient noise in about [0, 1] with one random gradient per unit cell corner; its own gradient goes to `slope` (3,).
+def gradient_noise(x: float, y: float, z: float, slope: Vectors) -> float:
+    """Gradient noise in about [0, 1] with one random gradient per unit cell corner; its own gradient goes to
+    `slope` (3,).
 
-    Bumps need the gradient, so this is not the noise of the film. Source of the method: Perlin, Improving noise, 2002.
+    Bumps need the gradient, so this is not the noise of the film. Source of the method: Perlin, Improving
+    noise, 2002.
     """
     fx, fy, fz = np.floor(x), np.floor(y), np.floor(z)
     i, j, k = np.int64(fx), np.int64(fy), np.int64(fz)
@@ -73,8 +85,10 @@ def gradient_noise(x, y, z, slope):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fractal_noise(x, y, z, frequency, octaves, slope, scratch):  # type: ignore[no-untyped-def]
-    """Sum of octaves of noise, each half as high and 2.03 times as fine, in [0, 1]; gradient to `slope` (3,)."""
+def fractal_noise(
+    x: float, y: float, z: float, frequency: float, octaves: int, slope: Vectors, scratch: Vectors
+) -> float:
+    """Octaves of noise, each half as high and 2.03 times as fine, about [0, 1]; gradient to `slope` (3,)."""
     total, weight, height, f = 0.0, 0.0, 1.0, frequency
     slope[0] = slope[1] = slope[2] = 0.0
     for octave in range(octaves):
@@ -91,23 +105,38 @@ def fractal_noise(x, y, z, frequency, octaves, slope, scratch):  # type: ignore[
 
 
 @kernel
-def _smooth_step(low, high, x):  # type: ignore[no-untyped-def]
+def _smooth_step(low: float, high: float, x: float) -> float:
     t = min(1.0, max(0.0, (x - low) / (high - low)))
     return t * t * (3.0 - 2.0 * t)
 
 
 @kernel
-def _blend(color, other, share):  # type: ignore[no-untyped-def]
+def _copy(color: Vectors, out: Vectors) -> None:
+    for c in range(3):  # a slice would compile NumPy's broadcasting, which takes seconds
+        out[c] = color[c]
+
+
+@kernel
+def _blend(color: Vectors, other: Vectors, share: float) -> None:
     for c in range(3):
         color[c] += share * (other[c] - color[c])
 
 
 @kernel
-def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ignore[no-untyped-def]
-    """Lay rust of a given `amount` (0 to 1) over `albedo`, roughen `bump`; returns the share of the surface it covers.
+def _rust_layer(
+    rest: Vectors,
+    amount: float,
+    palette: Vectors,
+    albedo: Vectors,
+    bump: Vectors,
+    slope: Vectors,
+    scratch: Vectors,
+) -> float:
+    """Lay rust of a given `amount` (0 to 1) over `albedo`, roughen `bump`; returns the share of the surface
+    it covers.
 
-    Rust spreads where the amount exceeds a noise, so it grows as patches with an irregular edge: bright where it is young
-    (just above the threshold), dark brown in the core, with darker pits. `colors` (3, 3): rim, body and core.
+    Rust spreads where the amount exceeds a noise, so it grows as patches with an irregular edge: bright where
+    it is young (just above the threshold), dark brown in the core, with darker pits.
     """
     if amount <= 0.004:
         return 0.0
@@ -116,7 +145,7 @@ def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ig
     grain = fractal_noise(x, y, z, 64.0, 4, slope, scratch)
     level = 1.5 * amount - 1.6 * (patch - 0.2) + 0.5 * (grain - 0.5) * (1.0 - 0.5 * amount)
     # Ahead of the rust proper the steel is tarnished.
-    _blend(albedo, colors[2], 0.45 * _smooth_step(-0.4, 0.05, level))
+    _blend(albedo, palette[RUST_CORE], 0.45 * _smooth_step(-0.4, 0.05, level))
     cover = _smooth_step(-0.05, 0.12, level)
     if cover <= 0.0:
         return 0.0
@@ -129,9 +158,9 @@ def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ig
     pit = _smooth_step(0.6, 0.7, grain) * _smooth_step(0.2, 0.6, level)
     shade = 0.6 + 0.8 * grain
     for c in range(3):
-        rust = colors[0, c] + body * (colors[1, c] - colors[0, c])
-        rust += core * (colors[2, c] - rust)
-        rust += powder * (colors[0, c] - rust)
+        rust = palette[RUST_RIM, c] + body * (palette[RUST_BODY, c] - palette[RUST_RIM, c])
+        rust += core * (palette[RUST_CORE, c] - rust)
+        rust += powder * (palette[RUST_RIM, c] - rust)
         rust *= shade * (1.0 - 0.7 * pit)
         albedo[c] += cover * (rust - albedo[c])
     for axis in range(3):
@@ -140,7 +169,17 @@ def _rust_layer(rest, amount, colors, albedo, bump, slope, scratch):  # type: ig
 
 
 @kernel
-def _film_color(rest, up, stain, dust, palette, albedo, bump, slope, scratch):  # type: ignore[no-untyped-def]
+def _film_color(
+    rest: Vectors,
+    up: Vectors,
+    stain: float,
+    dust: float,
+    palette: Vectors,
+    albedo: Vectors,
+    bump: Vectors,
+    slope: Vectors,
+    scratch: Vectors,
+) -> tuple[float, float]:
     """Paint with runoff rust and dust over it, to `albedo`; returns its roughness and its gloss (0 to 1)."""
     x, y, z = rest[0], rest[1], rest[2]
     cloud = fractal_noise(x, y, z, 6.0, 5, slope, scratch)
@@ -155,26 +194,34 @@ def _film_color(rest, up, stain, dust, palette, albedo, bump, slope, scratch):  
         fall = x * up[0] + y * up[1] + z * up[2]
         sx, sy, sz = x - fall * up[0], y - fall * up[1], z - fall * up[2]
         streak = fractal_noise(
-            42.0 * sx + 4.0 * fall * up[0], 42.0 * sy + 4.0 * fall * up[1], 42.0 * sz + 4.0 * fall * up[2], 1.0, 3, slope, scratch
+            42.0 * sx + 4.0 * fall * up[0],
+            42.0 * sy + 4.0 * fall * up[1],
+            42.0 * sz + 4.0 * fall * up[2],
+            1.0,
+            3,
+            slope,
+            scratch,
         )
         cover = _smooth_step(0.0, 0.9, stain * (0.3 + 2.0 * max(0.0, streak - 0.15)))
         for c in range(3):
             # A thin stain filters the paint's light, a thick one covers it.
-            albedo[c] *= np.exp(-cover * palette[6, c])
-        _blend(albedo, palette[5], 0.85 * cover**1.3)
+            albedo[c] *= np.exp(-cover * palette[STAIN_DEPTH, c])
+        _blend(albedo, palette[STAIN], 0.85 * cover**1.3)
         roughness += 0.35 * cover
         gloss *= 1.0 - 0.7 * cover
     if dust > 0.01:
         speck = fractal_noise(x, y, z, 28.0, 3, slope, scratch)
         veil = (1.0 - np.exp(-1.4 * dust)) * min(1.0, 0.45 + 0.9 * speck)
-        _blend(albedo, palette[7], 0.85 * veil)
+        _blend(albedo, palette[DUST], 0.85 * veil)
         roughness += 0.4 * veil
         gloss *= 1.0 - 0.9 * veil
     return min(roughness, 0.95), gloss
 
 
 @kernel
-def _ggx(normal_light, normal_view, normal_half, view_half, roughness, f0):  # type: ignore[no-untyped-def]
+def _ggx(
+    normal_light: float, normal_view: float, normal_half: float, view_half: float, roughness: float, f0: float
+) -> float:
     """Specular lobe times cosine: GGX, Smith's shadowing in its joint approximation, Schlick's Fresnel.
 
     Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007.
@@ -190,8 +237,8 @@ def _ggx(normal_light, normal_view, normal_half, view_half, roughness, f0):  # t
 
 
 @kernel
-def _sky(x_up, out):  # type: ignore[no-untyped-def]
-    """Radiance from a direction whose component along up is `x_up`: a pale sky over a warmer, darker ground."""
+def _sky(x_up: float, out: Vectors) -> None:
+    """Radiance from a direction with the component `x_up` along up: pale sky over warmer, darker ground."""
     t = _smooth_step(-0.25, 0.35, x_up)
     high = max(0.0, x_up)
     out[0] = (1.0 - t) * 0.30 + t * (0.92 - 0.20 * high)
@@ -200,8 +247,8 @@ def _sky(x_up, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_sky(directions, blocked, up, total):  # type: ignore[no-untyped-def]
-    """Add to `total` (s, 3) the sky's light along one direction a sample; where it is blocked, a dim reflected light."""
+def add_sky(directions: NDArray[np.float32], blocked: NDArray[np.bool_], up: Vectors, total: Vectors) -> None:
+    """Add to `total` (s, 3) the sky's light along one direction a sample; if blocked, a dim reflection."""
     sky = np.empty(3)
     for i in range(len(directions)):
         _sky(directions[i, 0] * up[0] + directions[i, 1] * up[1] + directions[i, 2] * up[2], sky)
@@ -210,50 +257,70 @@ def add_sky(directions, blocked, up, total):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shade(kind, position, normal, rest, stain, dust, rust, layer, color, eye, key, key_color, up, palette, lit, sky_light, out):  # type: ignore[no-untyped-def]
+def shade(
+    kind: NDArray[np.uint8],
+    position: Vectors,
+    normal: Vectors,
+    rest: Vectors,
+    stain: Vectors,
+    dust: Vectors,
+    rust: Vectors,
+    layer: Vectors,
+    color: Vectors,
+    eye: Vectors,
+    key: Vectors,
+    key_color: Vectors,
+    up: Vectors,
+    palette: Vectors,
+    lit: Vectors,
+    sky_light: Vectors,
+    out: NDArray[np.float32],
+) -> None:
     """Tone-mapped linear colour of s samples, to `out` float32 (s, 3).
 
-    kind (s,): FRONT, BACK, RIM, METAL or BARE_PART; position, normal, rest (s, 3); stain, dust, rust, layer (s,), the
-    last the place between the back (0) and the front (1) of the rim; color (s, 3) linear paint; key (3,) towards the key
-    light; lit (s,) its visible share; sky_light (s, 3) mean radiance over the cosine-weighted hemisphere. palette (9, 3):
-    primer, steel, the three of rust, stain, its absorption, dust, parts without paint.
+    kind (s,): FRONT, BACK, RIM, METAL or BARE_PART; position, normal, rest (s, 3); stain, dust, rust, layer
+    (s,), the last the place between the back (0) and the front (1) of the rim; color (s, 3) linear paint; key
+    (3,) towards the key light; lit (s,) its visible share; sky_light (s, 3) mean radiance over the
+    cosine-weighted hemisphere. palette (9, 3), linear, by the rows named above.
     """
     albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     n, view, env = np.empty(3), np.empty(3), np.empty(3)
     for i in range(len(kind)):
         k = kind[i]
-        bump[:] = 0.0
+        bump[0] = bump[1] = bump[2] = 0.0
         f0, roughness, gloss, metallic = 0.04, 0.6, 1.0, 0.0
         if k == FRONT or (k == RIM and layer[i] > 0.6):
-            albedo[:] = color[i]
-            roughness, gloss = _film_color(rest[i], up, stain[i], dust[i], palette, albedo, bump, slope, scratch)
-        elif k == BACK or k == RIM:
-            albedo[:] = palette[0]
+            _copy(color[i], albedo)
+            roughness, gloss = _film_color(
+                rest[i], up, stain[i], dust[i], palette, albedo, bump, slope, scratch
+            )
+        elif k in (BACK, RIM):
+            _copy(palette[PRIMER], albedo)
             value = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 30.0, 3, slope, scratch)
             for c in range(3):
                 albedo[c] *= 0.82 + 0.3 * value
             if k == RIM:
                 # A broken edge is fresh in places and holds grime in others.
-                _blend(albedo, palette[7], 0.75 * _smooth_step(0.38, 0.6, value))
+                _blend(albedo, palette[DUST], 0.75 * _smooth_step(0.38, 0.6, value))
                 for c in range(3):
                     albedo[c] *= 0.8
             # Rust of the metal clings to the back of the film and bleeds out under its edge.
-            cover = _rust_layer(rest[i], 0.6 * rust[i], palette[2:5], albedo, bump, slope, scratch)
+            cover = _rust_layer(rest[i], 0.6 * rust[i], palette, albedo, bump, slope, scratch)
             roughness, gloss = 0.8, 0.5 * (1.0 - cover)
         elif k == METAL:
-            albedo[:] = palette[1]
+            _copy(palette[STEEL], albedo)
             scale = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 14.0, 4, slope, scratch)
             for c in range(3):
                 albedo[c] *= 0.75 + 0.5 * scale
-            cover = _rust_layer(rest[i], rust[i], palette[2:5], albedo, bump, slope, scratch)
+            cover = _rust_layer(rest[i], rust[i], palette, albedo, bump, slope, scratch)
             metallic = 0.75 * (1.0 - cover)
             roughness = 0.42 + 0.2 * scale + 0.45 * cover
             gloss = 1.0 - 0.6 * cover
             veil = 0.5 * (1.0 - np.exp(-1.4 * dust[i]))
-            _blend(albedo, palette[7], veil)
+            _blend(albedo, palette[DUST], veil)
             metallic *= 1.0 - veil
         else:
-            albedo[:] = palette[8]
+            _copy(palette[UNPAINTED], albedo)
             roughness = 0.5
         distance = 0.0
         for c in range(3):
@@ -286,14 +353,18 @@ def shade(kind, position, normal, rest, stain, dust, rust, layer, color, eye, ke
         for c in range(3):
             tint = f0 * gloss * (1.0 - metallic) + metallic * albedo[c]
             fresnel = tint + (max(tint, 1.0 - roughness) - tint) * edge * gloss
-            light = albedo[c] * (1.0 - metallic) * (max(nl, 0.0) * lit[i] * key_color[c] / np.pi + sky_light[i, c])
+            light = (
+                albedo[c]
+                * (1.0 - metallic)
+                * (max(nl, 0.0) * lit[i] * key_color[c] / np.pi + sky_light[i, c])
+            )
             light += tint * specular * lit[i] * key_color[c] + 0.8 * fresnel * env[c] * min(1.0, openness)
             out[i, c] = tone(light)
 
 
 @kernel
-def tone(x):  # type: ignore[no-untyped-def]
-    """A film-like shoulder: linear up to 0.55, then bent so that white is reached only by far brighter light."""
+def tone(x: float) -> float:
+    """A film-like shoulder: linear up to 0.55, then bent, so that only far brighter light becomes white."""
     if x <= 0.55:
         return x
     return 0.55 + 0.45 * (1.0 - np.exp(-(x - 0.55) / 0.45))

@@ -15,9 +15,9 @@ from weathercoat.mesh.surface import Indices, Vectors, face_normals, vertex_norm
 class Shell:
     """A sheet of n vertices, thickened.
 
-    vertices: float64 (2 n, 3), first the n vertices of the front, then those of the back, in the sheet's order.
-    front, back: int32 (m, 3), counter-clockwise seen from outside of the shell.
-    rim: int32 (2 b, 3), two faces for each of the b open edges.
+    vertices: float64 (2 n, 3), first the n vertices of the front, then those of the back, in the sheet's
+    order. front, back: int32 (m, 3), counter-clockwise seen from outside of the shell. rim: int32 (2 b, 3),
+    two faces for each of the b open edges.
     """
 
     vertices: Vectors
@@ -26,12 +26,15 @@ class Shell:
     rim: Indices
 
 
-def make_shell(vertices: Vectors, faces: Indices, thickness: float, *, gap: float = 0.0, bevel: float = 0.0) -> Shell:
+def make_shell(
+    vertices: Vectors, faces: Indices, thickness: float, *, gap: float = 0.0, bevel: float = 0.0
+) -> Shell:
     """Thicken a sheet along its normals.
 
-    The back lies `gap` above the sheet (negative: below it) and the front `thickness` above the back, in the units of
-    `vertices`. `bevel` draws the open edges of the front inwards by up to that length, so that two pieces which meet
-    along a closed crack show a groove; it never exceeds a quarter of the shortest edge at the vertex.
+    The back lies `gap` above the sheet (negative: below it) and the front `thickness` above the back, in the
+    units of `vertices`. `bevel` draws the open edges of the front inwards by up to that length, so that two
+    pieces which meet along a closed crack show a groove; it never exceeds a quarter of the shortest edge at
+    the vertex.
     """
     faces = np.asarray(faces, np.int32).reshape(-1, 3)
     count = len(vertices)
@@ -48,24 +51,29 @@ def make_shell(vertices: Vectors, faces: Indices, thickness: float, *, gap: floa
 
 
 def open_edges(faces: Indices) -> tuple[Indices, Indices, Indices]:
-    """The half-edges without a twin: their tails, their heads and their faces, each int32 (b,), in the order of faces."""
-    tails = faces.ravel().astype(np.int64)
-    heads = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    stride = int(faces.max()) + 1 if len(faces) else 1
-    is_open = ~np.isin(tails * stride + heads, heads * stride + tails)
+    """Tails, heads and faces, each int32 (b,), of the half-edges whose edge no other face has."""
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    stride = np.int64(faces.max()) + 1 if len(faces) else 1
+    edge = np.minimum(tails, heads) * stride + np.maximum(tails, heads)
+    order = np.argsort(edge, kind="stable")
+    repeated = edge[order[1:]] == edge[order[:-1]]
+    single = np.ones(len(edge), np.bool_)
+    single[order[1:][repeated]] = single[order[:-1][repeated]] = False
     owners = np.repeat(np.arange(len(faces), dtype=np.int32), 3)
-    return tails[is_open].astype(np.int32), heads[is_open].astype(np.int32), owners[is_open]
+    return tails[single], heads[single], owners[single]
 
 
 def smooth_outline(
     vertices: Vectors, faces: Indices, fixed: NDArray[np.bool_], passes: int, *, sharpest: float = 0.3
 ) -> Vectors:
-    """The vertices (n, 3) with the open edges of the sheet smoothed within its surface, except where `fixed` (n,).
+    """The vertices (n, 3) with the open edges of the sheet smoothed within its surface, except where `fixed`
+    (n,).
 
-    A crack that runs along the edges of random triangles zigzags. Each pass draws a vertex half way to the middle of its
-    two neighbours along the outline and then a little more than half way back, which takes away the zigzag and keeps the
-    form (Taubin, A signal processing approach to fair surface design, 1995). A vertex stays where that would leave the
-    surface: where more than `sharpest` of the way leads along the normal, as across a crease.
+    A crack that runs along the edges of random triangles zigzags. Each pass draws a vertex half way to the
+    middle of its two neighbours along the outline and then a little more than half way back, which takes away
+    the zigzag and keeps the form (Taubin, A signal processing approach to fair surface design, 1995). A
+    vertex stays where that would leave the surface: where more than `sharpest` of the way leads along the
+    normal, as across a crease.
     """
     tails, heads, _ = open_edges(faces)
     ends = np.bincount(tails, minlength=len(vertices)) + np.bincount(heads, minlength=len(vertices))
@@ -98,7 +106,7 @@ def _inward(
         for axis in range(3):
             total[:, axis] += np.bincount(end, direction[:, axis], len(vertices))
     squared = np.einsum("ij,ij->i", total, total)
-    # Two unit directions u, v: (u + v) / (1 + u.v) is the mitre, which is 2 (u + v) / |u + v|^2; at most twice as long.
+    # The mitre of unit directions u, v is 2 (u + v) / |u + v|^2; it is held to four times |u + v| / 2.
     mitre = ends / np.maximum(squared, 0.25 * ends**2 + (ends == 0))
     shift = total * (length * mitre)[:, None]
     shortest = np.full(len(vertices), np.inf)
@@ -116,8 +124,8 @@ def _inward(
 def corner_normals(vertices: Vectors, faces: Indices, crease: float) -> NDArray[np.float32]:
     """Shading normal of each corner of each face, float32 (m, 3, 3).
 
-    A corner averages the faces round its vertex, weighted by angle, whose normals lie within `crease` [rad] of its own
-    face's, so that creases stay sharp and everything else is smooth.
+    A corner averages the faces round its vertex, weighted by angle, whose normals lie within `crease` [rad]
+    of its own face's, so that creases stay sharp and everything else is smooth.
     """
     faces = np.ascontiguousarray(faces, np.int32).reshape(-1, 3)
     order = np.argsort(faces.ravel(), kind="stable")
@@ -132,13 +140,31 @@ def corner_normals(vertices: Vectors, faces: Indices, crease: float) -> NDArray[
 
 
 @kernel
-def _corner_normals(vertices, faces, normal, order, start, least_cosine, out):  # type: ignore[no-untyped-def]
+def _corner_normals(
+    vertices: Vectors,
+    faces: Indices,
+    normal: Vectors,
+    order: NDArray[np.int64],
+    start: NDArray[np.int64],
+    least_cosine: float,
+    out: NDArray[np.float32],
+) -> None:
     weight = np.empty(faces.size)
     for corner in range(faces.size):
         f, i = corner // 3, corner % 3
         p, q, r = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
-        a, b = vertices[q] - vertices[p], vertices[r] - vertices[p]
-        weight[corner] = np.arctan2(np.linalg.norm(np.cross(a, b)), np.dot(a, b))
+        ax, ay, az = (
+            vertices[q, 0] - vertices[p, 0],
+            vertices[q, 1] - vertices[p, 1],
+            vertices[q, 2] - vertices[p, 2],
+        )
+        bx, by, bz = (
+            vertices[r, 0] - vertices[p, 0],
+            vertices[r, 1] - vertices[p, 1],
+            vertices[r, 2] - vertices[p, 2],
+        )
+        cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        weight[corner] = np.arctan2(np.sqrt(cx * cx + cy * cy + cz * cz), ax * bx + ay * by + az * bz)
     for corner in range(faces.size):
         f, i = corner // 3, corner % 3
         v = faces[f, i]

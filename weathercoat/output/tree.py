@@ -1,4 +1,4 @@
-"""Ray queries without Embree: a tree of bounding boxes over the faces in Morton order, traversed by compiled kernels."""
+"""Ray queries without Embree: a tree of bounding boxes over the faces in Morton order."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _DEPTH = 64  # of the stack: a complete tree of 2**31 leaves needs 33
 class TreeRays:
     """Ray queries on a mesh, as `rays.RayQueries`; slower than Embree, with the same answers up to rounding.
 
-    The tree is complete and implicit: the children of node i are 2 i + 1 and 2 i + 2, and the leaves, the last nodes, hold
-    `_LEAF` faces each in the order of their centres along a Morton curve.
+    The tree is complete and implicit: the children of node i are 2 i + 1 and 2 i + 2, and the leaves, the
+    last nodes, hold `_LEAF` faces each in the order of their centres along a Morton curve.
     """
 
     def __init__(self, vertices: Vectors, faces: Indices) -> None:
@@ -45,7 +45,18 @@ class TreeRays:
     ) -> tuple[Indices, NDArray[np.float32]]:
         """The first face each ray meets, -1 for none, and the weights of its second and third corner."""
         face, weights = np.full(len(origins), -1, np.int32), np.zeros((len(origins), 2), np.float32)
-        _trace(origins, directions, np.inf, False, self._first_leaf, self._low, self._high, self._corners, face, weights)
+        _trace(
+            origins,
+            directions,
+            np.inf,
+            False,
+            self._first_leaf,
+            self._low,
+            self._high,
+            self._corners,
+            face,
+            weights,
+        )
         met = face >= 0
         face[met] = self._order[face[met]]
         return face, weights
@@ -55,7 +66,18 @@ class TreeRays:
     ) -> NDArray[np.bool_]:
         """Whether each ray meets any face within `reach`."""
         face, weights = np.full(len(origins), -1, np.int32), np.zeros((len(origins), 2), np.float32)
-        _trace(origins, directions, reach, True, self._first_leaf, self._low, self._high, self._corners, face, weights)
+        _trace(
+            origins,
+            directions,
+            reach,
+            True,
+            self._first_leaf,
+            self._low,
+            self._high,
+            self._corners,
+            face,
+            weights,
+        )
         return face >= 0
 
 
@@ -71,8 +93,8 @@ def _morton_codes(points: Vectors) -> NDArray[np.uint64]:
 
 
 @kernel
-def _enter(low, high, node, origin, inverse, reach):  # type: ignore[no-untyped-def]
-    """Distance at which a ray enters the box of a node; infinite where it misses it or enters beyond `reach`."""
+def _enter(low: Vectors, high: Vectors, node: int, origin: Vectors, inverse: Vectors, reach: float) -> float:
+    """Distance at which a ray enters the box of a node; infinite where it misses or enters beyond `reach`."""
     if low[node, 0] > high[node, 0]:
         return np.inf  # a leaf without faces
     first, last = 0.0, reach
@@ -84,7 +106,7 @@ def _enter(low, high, node, origin, inverse, reach):  # type: ignore[no-untyped-
 
 
 @kernel
-def _meet(corners, k, origin, direction):  # type: ignore[no-untyped-def]
+def _meet(corners: Vectors, k: int, origin: Vectors, direction: Vectors) -> tuple[float, float, float]:
     """Distance to triangle k of (m, 3, 3), or infinity, and the weights of its second and third corner.
 
     Source: Moeller and Trumbore, Fast, minimum storage ray-triangle intersection, 1997.
@@ -110,7 +132,18 @@ def _meet(corners, k, origin, direction):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _trace(origins, directions, reach, any_hit, first_leaf, low, high, corners, face, weights):  # type: ignore[no-untyped-def]
+def _trace(
+    origins: NDArray[np.float32],
+    directions: NDArray[np.float32],
+    reach: float,
+    any_hit: bool,
+    first_leaf: int,
+    low: Vectors,
+    high: Vectors,
+    corners: Vectors,
+    face: Indices,
+    weights: NDArray[np.float32],
+) -> None:
     origin, direction, inverse = np.empty(3), np.empty(3), np.empty(3)
     stack, entry = np.empty(_DEPTH, np.int64), np.empty(_DEPTH)
     for ray in range(len(origins)):
