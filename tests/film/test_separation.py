@@ -9,8 +9,10 @@ import pytest
 
 from tests import zoo
 from tests.film.films import Film, make_film
+from weathercoat.film.lift import sum_lift
 from weathercoat.film.separation import find_separating, separate
 from weathercoat.film.state import evaluate_tension
+from weathercoat.mesh.shapes import make_sphere
 from weathercoat.mesh.surface import Surface
 
 STEPS = 400
@@ -36,9 +38,10 @@ def first_steps(film: Film) -> dict[int, int]:
     return when
 
 
+@pytest.mark.parametrize("rule", ["drying", "face"])
 @pytest.mark.parametrize("law", ["saturating", "linear"])
 @pytest.mark.parametrize("base", [0.5, 0.8])
-def test_a_flat_film_separates_at_the_predicted_step(law: str, base: float) -> None:
+def test_a_flat_film_separates_at_the_predicted_step(rule: str, law: str, base: float) -> None:
     """All at once, in the first step with k 3 T(t) > A (1 - d t): six half-edges, each lifting half of k T."""
     film = attached_film(
         zoo.make_hexagon(2), tension_law=law, adhesion_base=base, lift_sum="per_valence", **DRYING
@@ -116,3 +119,35 @@ def test_vertices_without_a_face_do_not_separate() -> None:
     film.mesh.alive[6] = False
     film.mesh.half_edge[7:10] = -1
     assert separating(film, 1.0) == list(range(7))
+
+
+@pytest.mark.parametrize("rule", ["drying", "face"])
+@pytest.mark.parametrize("sums", ["plain", "per_valence"])
+def test_finds_whom_a_plain_evaluation_finds_while_the_film_moves(rule: str, sums: str) -> None:
+    """The lift that is kept for undisturbed vertices, against all lifts summed anew in every step."""
+    film = attached_film(
+        make_sphere(subdivisions=2), tension_initial=0.0, tension_rate=3.0, lift_coefficient=0.3, lift_sum=sums,
+        lift_tension=rule, adhesion_amplitude=0.5, adhesion_decay_rate=0.5, cohesion_base=1.2,
+    )  # fmt: skip
+    random = np.random.default_rng(3)
+    seen = 0
+    for step in range(1, 31):
+        age = step / 30
+        found = separating(film, age)
+        count = film.mesh.vertex_count
+        tension = film.state.tension_now
+        if rule == "drying":
+            tension = np.full(len(tension), 1 - math.exp(-3 * age))
+        total = np.empty(count)
+        sum_lift(film.mesh, film.state, 2.0, tension, sums == "per_valence", total, np.empty(count, np.int32))
+        adhesion = np.maximum(film.state.adhesion - 0.5 * age, 0.0)[film.mesh.origin[:count]]
+        margin = 0.3 * total - adhesion
+        margin[film.state.separated[:count]] = -1.0
+        assert (np.abs(margin) > 1e-12).all()
+        assert found == np.flatnonzero(margin > 0).tolist()
+        seen += len(found)
+        separate(film.mesh, film.state, np.array(found, np.int32), age)
+        film.fracture(age)
+        moved = np.flatnonzero(film.state.separated[: film.mesh.vertex_count])
+        film.mesh.positions[moved] += random.normal(scale=0.02, size=(len(moved), 3))
+    assert 30 < seen <= 162
