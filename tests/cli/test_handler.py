@@ -164,6 +164,24 @@ def test_a_broken_pipe_is_quiet() -> None:
     process.stderr.close()
 
 
+def test_signs_that_standard_output_lacks_are_escaped() -> None:
+    done = subprocess.run(
+        [*COMMAND, "config", "schema"],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert json.loads(done.stdout)["title"] == "weathercoat config"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names that are no text")
+def test_a_path_that_is_no_text(tmp_path: Path) -> None:
+    path = os.fsencode(tmp_path) + b"/\xff.obj"
+    done = subprocess.run([*COMMAND, "sample", "plate", "-o", path], capture_output=True, check=True)
+    assert Path(os.fsdecode(path)).exists()
+    assert done.stdout.endswith(b"\\udcff.obj\n")
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 def test_a_full_standard_output_is_an_output_error() -> None:
     with Path("/dev/full").open("w") as full:

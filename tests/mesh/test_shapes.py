@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weathercoat.errors import UsageError
+from weathercoat.errors import LimitError, UsageError
 from weathercoat.mesh import shapes
 from weathercoat.mesh.surface import Surface
 
@@ -117,7 +117,6 @@ def test_random_sheet_is_homogeneous_and_shows_no_direction() -> None:
         ("plate", {"columns": 0}),
         ("plate", {"height": math.nan}),
         ("curved-plate", {"angle": 360.0}),
-        ("sphere", {"subdivisions": 10}),
         ("torus", {"tube": 0.5}),
         ("pipe", {"wall": 0.2}),
         ("barrel", {"height": 0.5}),
@@ -129,4 +128,27 @@ def test_random_sheet_is_homogeneous_and_shows_no_direction() -> None:
 )
 def test_impossible_shapes_are_refused(name: str, arguments: dict[str, float]) -> None:
     with pytest.raises(UsageError):
+        shapes.SHAPES[name](**arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("plate", {"columns": 10**6, "rows": 10**6}),
+        ("curved-plate", {"columns": 10**6, "rows": 10**6}),
+        ("sphere", {"subdivisions": 10**9}),
+        ("torus", {"segments": 10**9}),
+        ("pipe", {"rows": 10**9}),
+        ("barrel", {"height": 1e300}),
+        ("box", {"cells": 10**6}),
+        ("sign", {"edge_length": 1e-9}),
+        ("bracket", {"edge_length": 1e-9}),
+        ("gear", {"teeth": 10**9}),
+        ("sheet", {"faces": 10**9}),
+    ],
+)
+def test_shapes_that_would_fill_the_memory_are_refused_at_once(
+    name: str, arguments: dict[str, float]
+) -> None:
+    with pytest.raises(LimitError):
         shapes.SHAPES[name](**arguments)

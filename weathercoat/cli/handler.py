@@ -14,6 +14,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from io import TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -34,6 +35,9 @@ class Terminated(BaseException):
 
 def main() -> NoReturn:
     """The entry point: run the command line of this process and exit."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        # A path that is no valid text, or a sign that the terminal lacks, is no reason to fail.
+        sys.stdout.reconfigure(errors="backslashreplace")
     instruction = os.environ.get(COMPLETION_VARIABLE)
     if instruction:
         from click.shell_completion import shell_complete

@@ -13,8 +13,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.errors import UsageError
+from weathercoat.errors import LimitError, UsageError
 from weathercoat.mesh.surface import Indices, Surface, Vectors, make_surface
+
+MOST_FACES = 20_000_000
 
 
 def make_plate(
@@ -26,6 +28,7 @@ def make_plate(
     """An upright sheet without thickness that faces +z, a grid of two triangles a cell."""
     _require_positive(width=width, height=height)
     _require_at_least(1, columns=columns, rows=rows)
+    _require_few(2 * columns * rows)
     u, v, faces = _grid(columns, rows)
     return _named("plate", np.stack([(u - 0.5) * width, v * height, np.zeros_like(u)], axis=1), faces)
 
@@ -40,6 +43,7 @@ def make_curved_plate(
     """A sheet bent to a part of a cylinder about the y axis; its convex side faces +z."""
     _require_positive(radius=radius, angle=angle, height=height)
     _require_at_least(1, columns=columns, rows=rows)
+    _require_few(2 * columns * rows)
     if angle >= 360 or angle / columns > 90:
         raise UsageError("angle must be under 360 degrees, and under 90 a column")
     u, v, faces = _grid(columns, rows)
@@ -56,8 +60,7 @@ def make_sphere(
     """A sphere of 20 * 4**subdivisions nearly equal triangles."""
     _require_positive(radius=radius)
     _require_at_least(0, subdivisions=subdivisions)
-    if subdivisions > 9:
-        raise UsageError("subdivisions must be at most 9, which is over 5 million faces")
+    _require_few(20 * 4 ** min(subdivisions, 100))
     golden = (1 + math.sqrt(5)) / 2
     corners = [(a, b, 0.0) for a in (-1.0, 1.0) for b in (-golden, golden)]
     vertices = np.array([np.roll(corner, shift) for shift in range(3) for corner in corners])
@@ -90,6 +93,7 @@ def make_torus(
     """A ring about the y axis."""
     _require_positive(radius=radius, tube=tube)
     _require_at_least(3, segments=segments, sides=sides)
+    _require_few(2 * segments * sides)
     if tube >= radius:
         raise UsageError("tube must be below radius")
     turn = 2 * np.pi * np.arange(sides) / sides
@@ -108,6 +112,7 @@ def make_pipe(
     _require_positive(radius=radius, wall=wall, height=height)
     _require_at_least(3, segments=segments)
     _require_at_least(1, rows=rows)
+    _require_few(4 * segments * rows)
     if wall >= radius:
         raise UsageError("wall must be below radius")
     up = np.linspace(0, height, rows + 1)
@@ -124,6 +129,7 @@ def make_barrel(
     """A steel drum: rims round recessed ends, and two rolling hoops about the wall."""
     _require_positive(radius=radius, height=height)
     _require_at_least(3, segments=segments)
+    _require_few(2 * segments * round(40 + min(height / radius, 1e9) / 0.15))
     if height < 2 * radius:
         raise UsageError("height must be at least twice the radius")
     rim, recess, hoop = 0.04 * radius, 0.08 * radius, 0.1 * radius
@@ -145,6 +151,7 @@ def make_box(
     """A box whose six sides are grids."""
     _require_positive(width=width, height=height, depth=depth)
     _require_at_least(1, cells=cells)
+    _require_few(12 * cells * cells)
     u, v, grid = _grid(cells, cells)
     lattice: list[NDArray[np.int64]] = []
     faces = []
@@ -172,6 +179,7 @@ def make_sign(
     _require_positive(
         width=width, height=height, thickness=thickness, corner=corner, hole=hole, edge_length=edge_length
     )
+    _require_few(4 * width * height / edge_length**2)
     if 2 * corner >= min(width, height) or hole > 0.7 * corner:
         raise UsageError("corner must be below half of width and height, and hole at most 0.7 of corner")
     x, y = width / 2 - corner, height / 2 - corner
@@ -202,6 +210,7 @@ def make_bracket(
         hole=hole,
         edge_length=edge_length,
     )
+    _require_few(4 * width * (height + depth) / min(edge_length, bend) ** 2)
     upright, lying, arc = height - bend, depth - bend, bend * np.pi / 2
     if thickness >= 2 * bend or min(upright, lying) < 4 * hole or width < 8 * hole:
         raise UsageError(
@@ -232,6 +241,7 @@ def make_gear(
     """An upright spur gear with straight flanks, its axis along z."""
     _require_positive(radius=radius, tooth=tooth, bore=bore, thickness=thickness, edge_length=edge_length)
     _require_at_least(5, teeth=teeth)
+    _require_few(16 * (radius / edge_length) ** 2 + 100 * teeth)
     root, pitch = radius - tooth, 2 * np.pi / teeth
     if root < 1.2 * bore:
         raise UsageError("bore must leave a ring below the teeth: at most (radius - tooth) / 1.2")
@@ -261,6 +271,7 @@ def make_random_sheet(
     _require_positive(width=width, height=height)
     _require_at_least(8, faces=faces)
     _require_at_least(0, seed=seed)
+    _require_few(faces)
     random = np.random.default_rng(seed)
     length = math.sqrt(4 * width * height / (math.sqrt(3) * faces))
     across, upwards = max(1, round(width / length)), max(1, round(height / length))
@@ -320,6 +331,12 @@ def _require_at_least(least: int, **counts: int) -> None:
     for name, value in counts.items():
         if value < least:
             raise UsageError(f"{name.replace('_', '-')} must be at least {least}, not {value}")
+
+
+def _require_few(faces: float) -> None:
+    """Refuse what would fill the memory before it is made; `faces` may be an estimate."""
+    if not faces <= MOST_FACES:
+        raise LimitError(f"this would have over {MOST_FACES:,} faces", remedy="ask for fewer or larger ones")
 
 
 def _grid(columns: int, rows: int) -> tuple[Vectors, Vectors, Indices]:
