@@ -1,8 +1,9 @@
 """`kernel`: how every compiled function of the package is declared, and where its machine code is kept.
 
-Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the cache folder is
-keyed by a hash of the package's sources; Numba itself keys by CPU. The folder lies in the user's cache directory, so
-that a package which is installed read-only caches as well; `NUMBA_CACHE_DIR` overrides it.
+Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the cache
+folder is keyed by a hash of the package's sources; Numba itself keys by CPU. The folder lies in the user's
+cache directory, so that a package which is installed read-only caches as well; `NUMBA_CACHE_DIR` overrides
+it.
 """
 
 from __future__ import annotations
@@ -32,5 +33,5 @@ import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` at its first call: cached on disk, IEEE arithmetic, division without a Python check."""
+    """Compile `function` at its first call: cached on disk, IEEE arithmetic, no check for division by zero."""
     return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]

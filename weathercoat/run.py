@@ -31,7 +31,14 @@ from weathercoat.output.pictures import (
     render_snapshot,
     write_png,
 )
-from weathercoat.output.report import make_report, make_timing, measure_surface, measure_snapshot, sha256, write_json
+from weathercoat.output.report import (
+    make_report,
+    make_timing,
+    measure_snapshot,
+    measure_surface,
+    sha256,
+    write_json,
+)
 from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
 from weathercoat.sim.recorders import Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
@@ -67,11 +74,12 @@ def run_asset(
     progress: Callable[[int, int], None] | None = None,
     log: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Age one model and write the folder `out`, whole or not at all; returns the report, with the timing as `timing`.
+    """Age one model and write the folder `out`, whole or not at all; returns the report, with the timing as
+    `timing`.
 
-    model: a path, or a binary stream, for which `format` may be given. strict: any warning ends the run with StrictError.
-    progress: called with the steps done and their number. log: called with each warning and with what was done, a line each.
-    Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
+    model: a path, or a binary stream, for which `format` may be given. strict: any warning ends the run with
+    StrictError. progress: called with the steps done and their number. log: called with each warning and with
+    what was done, a line each. Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
     """
     config = loaded.config
     say = log or (lambda line: None)
@@ -118,7 +126,9 @@ def run_asset(
             snapshots=recorder.figures,
         )
         write_json(folder / run_folder.REPORT, report)
-        around = {key: watch.seconds.get(key, 0.0) for key in ("read", "remesh", "prepare", "write", "pictures")}
+        around = {
+            key: watch.seconds.get(key, 0.0) for key in ("read", "remesh", "prepare", "write", "pictures")
+        }
         rows = {**simulation.seconds, "mesh": watch.seconds.get("mesh", 0.0)}
         timing = make_timing(rows, around)
         write_json(folder / run_folder.TIMING, timing)
@@ -161,8 +171,8 @@ def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | No
 def prepare_simulation(surface: Surface, config: Config, painted: Surface | None = None) -> Simulation:
     """A simulation of a surface by a config, at age 0.
 
-    painted: the surface before remeshing, whose frame places noise and defects, so that they lie alike at every
-    resolution. Raises CheckError where the surface is no oriented manifold.
+    painted: the surface before remeshing, whose frame places noise and defects, so that they lie alike at
+    every resolution. Raises CheckError where the surface is no oriented manifold.
     """
     colors = config.appearance
     try:
@@ -172,7 +182,9 @@ def prepare_simulation(surface: Surface, config: Config, painted: Surface | None
             deform=fill(DeformParameters, config),
             stain=fill(StainParameters, config),
             palette=Palette(
-                paint=_unit_color(colors.paint), metal=_unit_color(colors.metal), rust=_unit_color(colors.rust)
+                paint=_unit_color(colors.paint),
+                metal=_unit_color(colors.metal),
+                rust=_unit_color(colors.rust),
             ),
             steps=config.ageing.steps,
             duration=config.ageing.duration,

@@ -1,14 +1,19 @@
 """Angle constraints on hinges, in three forms.
 
-All three take hinges int32 (k, 4) of p1, p2 (the shared edge), p3, p4 as drawn in `mesh.dihedral`, and targets (k,): the
-wanted bend, phi_0 - pi [rad]. Each hinge has at least one vertex with an inverse mass. They change positions, in order.
+All three take hinges int32 (k, 4) of p1, p2 (the shared edge), p3, p4 as drawn in `mesh.dihedral`, and
+targets (k,): the wanted bend, phi_0 - pi [rad]. Each hinge has at least one vertex with an inverse mass. They
+change positions, in order.
 
-- `project_dihedrals`: the signed dihedral with its exact gradient over the four points; valid for every fold. The error
-  is taken by half angles, e = 2 tan((bend - target) / 2), which needs no trigonometry in the loop, equals the difference
-  to third order, and is clamped to 1, so that no correction turns a face by more than about a radian.
-- `project_split_angles`: the paper's form (4.3). Each face is turned about the edge until it makes half the outer dihedral with
+- `project_dihedrals`: the signed dihedral with its exact gradient over the four points; valid for every fold.
+The error
+  is taken by half angles, e = 2 tan((bend - target) / 2), which needs no trigonometry in the loop, equals the
+  difference to third order, and is clamped to 1, so that no correction turns a face by more than about a
+  radian.
+- `project_split_angles`: the paper's form (4.3). Each face is turned about the edge until it makes half the
+outer dihedral with
   the neutral direction n = (n1 + n2) / |n1 + n2|, which is held constant. Degenerates where n1 = -n2.
-- `project_arccos_angles`: C = arccos(-n1 . n2) - phi_0 (Mueller et al., 2007). It cannot tell a ridge from a valley, and has no
+- `project_arccos_angles`: C = arccos(-n1 . n2) - phi_0 (Mueller et al., 2007). It cannot tell a ridge from a
+valley, and has no
   gradient where the hinge is flat: such hinges stay.
 """
 
@@ -22,7 +27,9 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.dihedral import bend_gradient
 from weathercoat.mesh.surface import Indices, Vectors
 
-_LEAST_LEVERAGE = 0.05  # least sum of w |gradient|^2 that a correction counts with, relative to both apexes moving
+_LEAST_LEVERAGE = (
+    0.05  # least sum of w |gradient|^2 that a correction counts with, relative to both apexes moving
+)
 
 
 @kernel
@@ -99,7 +106,7 @@ def project_split_angles(
     """Turn each face of a hinge to half the outer dihedral; `target` holds the wanted bend [rad]."""
     for i in range(len(hinges)):
         p1, p2, p3, p4 = hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3]
-        ex, ey, ez, length = _edge(positions, p1, p2)
+        _, _, _, length = _edge(positions, p1, p2)
         mx, my, mz, m_norm = _normal(positions, p1, p2, p3)
         nx, ny, nz, n_norm = _normal(positions, p2, p1, p4)
         if not (length > 0.0 and m_norm > 0.0 and n_norm > 0.0):
@@ -157,10 +164,12 @@ def _turn_face(
     reach: float,
     stiffness: float,
 ) -> None:
-    """Bring the angle between the constant direction a, normal to the edge, and the face p1, p2, p3 to `half`.
+    """Bring the angle between the constant direction a, normal to the edge, and the face p1, p2, p3 to
+    `half`.
 
-    The apex is moved as if its height over the edge were at most `reach`, that of the lower of the two faces: the full step
-    of a high face moves the edge so far that a low one beside it turns by more than was gained, which diverges.
+    The apex is moved as if its height over the edge were at most `reach`, that of the lower of the two faces:
+    the full step of a high face moves the edge so far that a low one beside it turns by more than was gained,
+    which diverges.
     """
     ex, ey, ez, length = _edge(positions, p1, p2)
     mx, my, mz, norm = _normal(positions, p1, p2, p3)
@@ -176,7 +185,12 @@ def _turn_face(
     w1, w2, w3 = inverse_mass[p1], inverse_mass[p2], inverse_mass[p3]
     total = w1 * (1.0 - share) ** 2 + w2 * share**2 + w3
     # the angle's gradient is -m / height at p3, and its reaction at the edge
-    scale = stiffness * min(max(angle - half, -1.0), 1.0) * min(norm / length, reach) / max(total, _LEAST_LEVERAGE)
+    scale = (
+        stiffness
+        * min(max(angle - half, -1.0), 1.0)
+        * min(norm / length, reach)
+        / max(total, _LEAST_LEVERAGE)
+    )
     for axis, m in ((0, mx), (1, my), (2, mz)):
         positions[p3, axis] += w3 * scale * m
         positions[p1, axis] -= w1 * scale * (1.0 - share) * m

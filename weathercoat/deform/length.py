@@ -12,7 +12,8 @@ from weathercoat.mesh.surface import Indices, Vectors
 def project_lengths(positions: Vectors, inverse_mass: Vectors, ends: Indices, rest_length: Vectors) -> None:
     """Move the ends of each edge, in order, to its rest length, shared by inverse mass; changes positions.
 
-    ends: int32 (k, 2), at least one end of each with an inverse mass; rest_length: (k,). Edges of no length stay.
+    ends: int32 (k, 2), at least one end of each with an inverse mass; rest_length: (k,). Edges of no length
+    stay.
     """
     for i in range(len(ends)):
         a, b = ends[i, 0], ends[i, 1]

@@ -10,7 +10,7 @@ from weathercoat.mesh.surface import Indices, Vectors
 def lift_to_substrate(
     positions: Vectors, origin: Indices, rest_positions: Vectors, rest_normals: Vectors, vertices: Indices
 ) -> None:
-    """Put each of the vertices (k,) that is below its plane back on it along the normal; changes positions."""
+    """Put each of the vertices (k,) below its plane back on it along the normal; changes positions."""
     for v in vertices:
         o = origin[v]
         depth = 0.0

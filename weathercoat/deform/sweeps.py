@@ -1,7 +1,8 @@
 """Constraints of the separated film and the Gauss-Seidel sweeps over them (paper 4, 5).
 
-One sweep is all active lengths, then all active angles, then the substrate, each in a fixed order: half-edges are taken
-in strides (see `interleave`), so that neighbours, which wait for each other's results, do not follow one another.
+One sweep is all active lengths, then all active angles, then the substrate, each in a fixed order: half-edges
+are taken in strides (see `interleave`), so that neighbours, which wait for each other's results, do not
+follow one another.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ _LARGEST_BEND = 0.9 * math.pi  # a target beyond this would fold a hinge through
 class DeformParameters:
     """How separated film curls. Lengths in sizes, rates per unit of age, angles in radians.
 
-    The names are those of the config's sections: `curl_radius` is `curl.radius`. The string fields choose between forms.
+    The names are those of the config's sections: `curl_radius` is `curl.radius`. The string fields choose
+    between forms.
     """
 
     curl_rule: str = "curvature"  # or "angle"
@@ -45,10 +47,10 @@ class DeformParameters:
 class Constraints:
     """What holds the separated film in shape.
 
-    Half-edges, by the smaller one of a pair: rest_length (3 m,) [sizes]; span (3 m,), the distance between the centres
-    of the two faces at rest; angle_start (3 m,), the bend when the angle constraint was made, NaN without one; angle_age (3 m,).
-    Vertices: inverse_mass (3 m,), 1 once separated. `order` is the fixed order of all half-edges; the packed arrays hold what is
-    active and are made anew after an event.
+    Half-edges, by the smaller one of a pair: rest_length (3 m,) [sizes]; span (3 m,), the distance between
+    the centres of the two faces at rest; angle_start (3 m,), the bend when the angle constraint was made, NaN
+    without one; angle_age (3 m,). Vertices: inverse_mass (3 m,), 1 once separated. `order` is the fixed order
+    of all half-edges; the packed arrays hold what is active and are made anew after an event.
     """
 
     rest_length: Vectors
@@ -90,10 +92,11 @@ def make_constraints(mesh: HalfEdgeMesh) -> Constraints:
 
 
 def release(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices, age: float) -> None:
-    """Let vertices move that have separated: angle constraints on the edges opposite to them, from their present bend.
+    """Let vertices move that have separated: angle constraints on the edges opposite to them, from their
+    present bend.
 
-    The lengths of their edges are held from now on; no end of such an edge had moved before, so that is the rest length. A
-    constraint that exists already keeps its start.
+    The lengths of their edges are held from now on; no end of such an edge had moved before, so that is the
+    rest length. A constraint that exists already keeps its start.
     """
     constraints.inverse_mass[vertices] = 1.0
     _start_angles(mesh, vertices, age, constraints.angle_start, constraints.angle_age)
@@ -175,8 +178,8 @@ def pack(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
     ends, targets = np.empty((capacity, 2), np.int32), np.empty(capacity)
     hinges, hinge_edges = np.empty((capacity, 4), np.int32), np.empty(capacity, np.int32)
     lengths, angles = _pack(
-        mesh, constraints.inverse_mass, constraints.rest_length, constraints.angle_start, constraints.order, ends,
-        targets, hinges, hinge_edges,
+        mesh, constraints.inverse_mass, constraints.rest_length, constraints.angle_start, constraints.order,
+        ends, targets, hinges, hinge_edges,
     )  # fmt: skip
     constraints.length_ends, constraints.length_targets = ends[:lengths].copy(), targets[:lengths].copy()
     constraints.hinges, constraints.hinge_edges = hinges[:angles].copy(), hinge_edges[:angles].copy()
@@ -189,8 +192,8 @@ def pack(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
 def bend_targets(constraints: Constraints, parameters: DeformParameters, age: float) -> Vectors:
     """The wanted bend of each packed hinge at an age [rad], (k,).
 
-    By default the curvature grows at a rate to 1 / radius, so that curls belong to the paint; literally every outer
-    dihedral shrinks by an angle per age down to a floor.
+    By default the curvature grows at a rate to 1 / radius, so that curls belong to the paint; literally every
+    outer dihedral shrinks by an angle per age down to a floor.
     """
     p = parameters
     edges = constraints.hinge_edges
@@ -216,7 +219,11 @@ def deform(mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParam
             mesh.positions, constraints.inverse_mass, constraints.length_ends, constraints.length_targets
         )
         _PROJECT_ANGLES[parameters.deformation_angle](
-            mesh.positions, constraints.inverse_mass, constraints.hinges, target, parameters.deformation_angle_stiffness
+            mesh.positions,
+            constraints.inverse_mass,
+            constraints.hinges,
+            target,
+            parameters.deformation_angle_stiffness,
         )
         lift_to_substrate(
             mesh.positions, mesh.origin, mesh.rest_positions, mesh.rest_normals, constraints.free_vertices
@@ -232,7 +239,9 @@ _PROJECT_ANGLES = {
 
 @dataclass(frozen=True)
 class Residual:
-    """How far the film is from its constraints: strain of active edges, and error of angles [rad], RMS and largest."""
+    """How far the film is from its constraints: strain of active edges, and error of angles [rad], RMS and
+    largest.
+    """
 
     strain_rms: float
     strain_max: float

@@ -17,11 +17,12 @@ from weathercoat.mesh.surface import Indices, Vectors
 def flake(
     mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParameters, age: float, released: int, log: EventLog
 ) -> Vectors:
-    """Let fall what nothing holds; appends to the log and returns the rest area of each flake, (k,), in square sizes.
+    """Let fall what nothing holds; appends to the log and returns the rest area of each flake, (k,), in
+    square sizes.
 
-    Literally only a face whose three edges are broken falls. By default a connected piece that no attached vertex holds
-    falls as a whole, and so does one that hangs by less than a share of its outline: it tears off. Nothing can fall in a step
-    in which nothing broke and no vertex was released.
+    Literally only a face whose three edges are broken falls. By default a connected piece that no attached
+    vertex holds falls as a whole, and so does one that hangs by less than a share of its outline: it tears
+    off. Nothing can fall in a step in which nothing broke and no vertex was released.
     """
     face_count = len(mesh.alive)
     areas = np.empty(face_count)
@@ -55,15 +56,23 @@ def rest_face_area(mesh: HalfEdgeMesh, f: int) -> float:
     squared = 0.0
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        ui, uj = mesh.rest_positions[b, i] - mesh.rest_positions[a, i], mesh.rest_positions[b, j] - mesh.rest_positions[a, j]
-        vi, vj = mesh.rest_positions[c, i] - mesh.rest_positions[a, i], mesh.rest_positions[c, j] - mesh.rest_positions[a, j]
+        ui, uj = (
+            mesh.rest_positions[b, i] - mesh.rest_positions[a, i],
+            mesh.rest_positions[b, j] - mesh.rest_positions[a, j],
+        )
+        vi, vj = (
+            mesh.rest_positions[c, i] - mesh.rest_positions[a, i],
+            mesh.rest_positions[c, j] - mesh.rest_positions[a, j],
+        )
         squared += (ui * vj - uj * vi) ** 2
     return 0.5 * math.sqrt(squared)
 
 
 @kernel
 def drop_loose_faces(mesh: HalfEdgeMesh, log: EventLog, areas: Vectors) -> int:
-    """Delete each face whose three half-edges have no twin; their areas go to `areas`, their number is returned."""
+    """Delete each face whose three half-edges have no twin; their areas go to `areas`, their number is
+    returned.
+    """
     found = 0
     for f in range(len(mesh.alive)):
         h = 3 * f
@@ -120,7 +129,8 @@ def drop_islands(
     queue: Indices,
     areas: Vectors,
 ) -> int:
-    """Delete each connected piece that has no attached vertex; returns their number, and their areas in `areas`.
+    """Delete each connected piece that has no attached vertex; returns their number, and their areas in
+    `areas`.
 
     free: (m,) of `find_free_faces`; seen, queue: scratch (m,).
     """

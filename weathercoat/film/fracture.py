@@ -1,4 +1,6 @@
-"""Fracture: an edge between separated vertices breaks when its faces' tension exceeds its cohesion (paper 5.2)."""
+"""Fracture: an edge between separated vertices breaks when its faces' tension exceeds its cohesion (paper
+5.2).
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,19 @@ _REACH = 3.0  # shear lags beyond which a crack no longer unloads the film: exp(
 
 
 def fracture(
-    mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParameters, age: float, duration: float, log: EventLog
+    mesh: HalfEdgeMesh,
+    state: FilmState,
+    parameters: FilmParameters,
+    age: float,
+    duration: float,
+    log: EventLog,
 ) -> None:
-    """Break what is overloaded at an age, in as many rounds as cracks run edges in `duration`; appends to the log.
+    """Break what is overloaded at an age, in as many rounds as cracks run edges in `duration`; appends to the
+    log.
 
-    The most overloaded edges break first; each is tested again before it breaks, since every break relaxes what is
-    round it. What a break makes critical comes in the next round, so that neither the mesh nor the number of steps sets
-    the speed of a crack. Tensions must have been evaluated at this age.
+    The most overloaded edges break first; each is tested again before it breaks, since every break relaxes
+    what is round it. What a break makes critical comes in the next round, so that neither the mesh nor the
+    number of steps sets the speed of a crack. Tensions must have been evaluated at this age.
     """
     rules = make_film_rules(parameters)
     rounds = 1
@@ -44,8 +52,8 @@ def fracture(
 def edge_overload(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int, age: float) -> float:
     """Tension of the two faces of an inner edge over its cohesion now, the direction factor included.
 
-    Where an end is a tip and the way from it to the other end goes on in the tip's direction (dot product at least
-    alpha, on the rest surface), the cohesion counts beta times, once.
+    Where an end is a tip and the way from it to the other end goes on in the tip's direction (dot product at
+    least alpha, on the rest surface), the cohesion counts beta times, once.
     """
     g = mesh.twin[h]
     load = state.tension_now[h // 3] + state.tension_now[g // 3]
@@ -68,7 +76,9 @@ def cohesion_at(state: FilmState, rules: FilmRules, h: int, age: float) -> float
 
 @kernel
 def leads_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, tip: int, other: int) -> bool:
-    """Whether the edge from `tip` to `other` continues the crack that ends in `tip`; false where it is no tip."""
+    """Whether the edge from `tip` to `other` continues the crack that ends in `tip`; false where it is no
+    tip.
+    """
     if not state.is_tip[tip]:
         return False
     dot = 0.0
@@ -84,7 +94,9 @@ def leads_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, tip: int, o
 def find_overloaded(
     mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, age: float, candidates: Indices, overload: Vectors
 ) -> int:
-    """Collect the edges that break at an age, by their smaller half-edge, with their overload; returns how many."""
+    """Collect the edges that break at an age, by their smaller half-edge, with their overload; returns how
+    many.
+    """
     tail, twin, separated, is_tip = mesh.tail, mesh.twin, state.separated, state.is_tip
     tension, cohesion, fray_age = state.tension_now, state.cohesion, state.fray_age
     most_frayed = math.exp(-rules.cohesion_decay_rate * age)
@@ -132,7 +144,9 @@ def break_in_order(
 def break_edge(
     mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, age: float, h: int, log: EventLog, stack: Indices
 ) -> None:
-    """Break the edge of half-edge h: part its faces, make tips or copies at its ends, relax the film round it."""
+    """Break the edge of half-edge h: part its faces, make tips or copies at its ends, relax the film round
+    it.
+    """
     g = mesh.twin[h]
     start, end = mesh.tail[h], mesh.tail[g]
     origins = mesh.origin[start], mesh.origin[end]
@@ -154,7 +168,7 @@ def break_edge(
 
 @kernel
 def point_tip(mesh: HalfEdgeMesh, state: FilmState, tip: int, source: int, target: int) -> None:
-    """Record at `tip` the direction of the crack that ends there, on the rest surface from origin `source`."""
+    """Record at `tip` the direction of the crack that ends there, at rest, from origin `source`."""
     state.is_tip[tip] = True
     length = 0.0
     for axis in range(3):
@@ -187,11 +201,13 @@ def unload_round_crack(
     tip_end: bool,
     stack: Indices,
 ) -> None:
-    """Relax the film that hangs together with face `seed` beside a broken edge between the origins start and end.
+    """Relax the film that hangs together with face `seed` beside a broken edge between the origins start and
+    end.
 
-    A free edge unloads the film beside it over the shear lag: caps fall to 1 - exp(-r / lambda) at the distance r, and
-    tensions are clipped to them. What lies ahead of a tip, within alpha of its direction, is not unloaded: that is where
-    the stress of a crack goes. A face that is as relaxed already is not crossed, since what lies behind it is as well.
+    A free edge unloads the film beside it over the shear lag: caps fall to 1 - exp(-r / lambda) at the
+    distance r, and tensions are clipped to them. What lies ahead of a tip, within alpha of its direction, is
+    not unloaded: that is where the stress of a crack goes. A face that is as relaxed already is not crossed,
+    since what lies behind it is as well.
     """
     depth = 1
     stack[0] = seed
@@ -220,8 +236,8 @@ def unload_round_crack(
 def place_by_edge(mesh: HalfEdgeMesh, f: int, start: int, end: int) -> tuple[float, float, float]:
     """Where the rest centre of face f lies from the edge between two origins.
 
-    Returned: the distance to the edge, and for each end the cosine between the edge's outward direction there and the way
-    from that end to the centre.
+    Returned: the distance to the edge, and for each end the cosine between the edge's outward direction there
+    and the way from that end to the centre.
     """
     squared = 0.0
     along = 0.0

@@ -1,4 +1,6 @@
-"""Lift: how strongly the film's tension peels each attached vertex off the metal (paper 3.1 and 5.1, after Stoney)."""
+"""Lift: how strongly the film's tension peels each attached vertex off the metal (paper 3.1 and 5.1, after
+Stoney).
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,11 @@ def lift_factor_now(
     rest_factor: Vectors,
     convexity: float,
 ) -> float:
-    """1 / (1 + exp(-a (phi - pi))) of half-edge h with its present dihedral; one without a twin lifts as if flat.
+    """1 / (1 + exp(-a (phi - pi))) of half-edge h with its present dihedral; one without a twin lifts as if
+    flat.
 
-    The apex of h is attached. Where the other three corners of the hinge are too, it has not moved since the start.
+    The apex of h is attached. Where the other three corners of the hinge are too, it has not moved since the
+    start.
     """
     g = twin[h]
     if g < 0:
@@ -80,7 +84,15 @@ def sum_rest_lift(mesh: HalfEdgeMesh, rest_factor: Vectors, per_valence: bool, o
     ones = np.ones(len(mesh.alive))
     for v in range(len(out)):
         out[v], _ = lift_on(
-            mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, attached, rest_factor, 0.0, ones, per_valence
+            mesh.half_edge[v],
+            mesh.positions,
+            mesh.tail,
+            mesh.twin,
+            attached,
+            rest_factor,
+            0.0,
+            ones,
+            per_valence,
         )
 
 
@@ -96,8 +108,8 @@ def sum_lift(
 ) -> None:
     """Sum over the half-edges opposite to each attached vertex of tension times lift factor, into out (n,).
 
-    face_tension: (m,), the tension that lifts; opposite_count (n,): the number of those half-edges. Both are 0 for
-    vertices that have separated. The lift itself is k times the result.
+    face_tension: (m,), the tension that lifts; opposite_count (n,): the number of those half-edges. Both are
+    0 for vertices that have separated. The lift itself is k times the result.
     """
     out[:] = 0.0
     opposite_count[:] = 0
@@ -121,12 +133,19 @@ def find_overcome(
     is_uniform: bool,
     out: Indices,
 ) -> int:
-    """Collect in out the attached vertices with `lift_scale` times their sum above their adhesion; returns how many.
+    """Collect in out the attached vertices with `lift_scale` times their sum above their adhesion; returns
+    how many.
 
-    Adhesion is that at the start less `adhesion_loss`, not below 0. Where the tension is the same everywhere, vertices round
-    which nothing has moved keep the sum that they had at the start, `rest_lift`.
+    Adhesion is that at the start less `adhesion_loss`, not below 0. Where the tension is the same everywhere,
+    vertices round which nothing has moved keep the sum that they had at the start, `rest_lift`.
     """
-    positions, tail, twin, half_edge, origin = mesh.positions, mesh.tail, mesh.twin, mesh.half_edge, mesh.origin
+    positions, tail, twin, half_edge, origin = (
+        mesh.positions,
+        mesh.tail,
+        mesh.twin,
+        mesh.half_edge,
+        mesh.origin,
+    )
     separated, disturbed, adhesion = state.separated, state.disturbed, state.adhesion
     rest_factor, rest_lift = state.lift_factor, state.rest_lift
     found = 0
@@ -138,7 +157,15 @@ def find_overcome(
             total = rest_lift[v]
         else:
             total, _ = lift_on(
-                half_edge[v], positions, tail, twin, separated, rest_factor, convexity, face_tension, per_valence
+                half_edge[v],
+                positions,
+                tail,
+                twin,
+                separated,
+                rest_factor,
+                convexity,
+                face_tension,
+                per_valence,
             )
         if lift_scale * total > max(adhesion[origin[v]] - adhesion_loss, 0.0):
             out[found] = v

@@ -1,4 +1,4 @@
-"""Separation: an attached vertex lets go of the metal when the lift on it exceeds its adhesion (paper 5.1)."""
+"""Separation: a vertex lets go of the metal when the lift on it exceeds its adhesion (paper 5.1)."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import numpy as np
 from weathercoat.film.lift import disturb, find_overcome
 from weathercoat.film.state import FilmParameters, FilmState, drying_tension
 from weathercoat.mesh.halfedge import HalfEdgeMesh
-from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.mesh.surface import Indices
 
 
 def find_separating(mesh: HalfEdgeMesh, state: FilmState, parameters: FilmParameters, age: float) -> Indices:
     """The attached vertices whose lift exceeds their adhesion at an age, ascending, int32 (k,).
 
-    By default the film's drying tension lifts, not the face's own, since the relaxed one would leave the pieces round a
-    crack on the metal for ever. Tensions must have been evaluated at this age.
+    By default the film's drying tension lifts, not the face's own, since the relaxed one would leave the
+    pieces round a crack on the metal for ever. Tensions must have been evaluated at this age.
     """
     p = parameters
     is_uniform = p.lift_tension == "drying"

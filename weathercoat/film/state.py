@@ -1,7 +1,7 @@
 """The film's parameters and state: scalars on vertices, faces and half-edges that decide how it fails.
 
-What ages by a closed form is stored as (value at the last event, age of that event) and evaluated when it is needed, so
-that the number of steps is a resolution and not a part of the paint.
+What ages by a closed form is stored as (value at the last event, age of that event) and evaluated when it is
+needed, so that the number of steps is a resolution and not a part of the paint.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from weathercoat.mesh.surface import Vectors
 class FilmParameters:
     """How the film ages and fails. Lengths in sizes, rates per unit of age, forces dimensionless.
 
-    The names are those of the config's sections: `adhesion_base` is `adhesion.base`. The string fields choose between
-    the paper's literal rules and the default ones; the default is the first.
+    The names are those of the config's sections: `adhesion_base` is `adhesion.base`. The string fields choose
+    between the paper's literal rules and the default ones; the default is the first.
     """
 
     tension_law: str = "saturating"  # or "linear"
@@ -75,15 +75,15 @@ class FilmRules(NamedTuple):
 class FilmState(NamedTuple):
     """State of the film, plain arrays. n0 rest vertices, m faces; arrays over vertices have the capacity 3 m.
 
-    Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite while attached;
-    is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3) there, a unit vector on the
-    rest surface.
-    Faces: tension, tension_age, tension_cap (m,): the value at its last event, the age of it, and what it tends to;
-    tension_now (m,), evaluated at the age of the step; fray_age (m,), when the face got its first broken edge, infinite
-    before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie
-    uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a
-    round of fracture carried over between steps. mean_edge: mean rest length of the edges. rest_lift (n0,): what the film
-    lifts with at tension 1 while nothing round the vertex has moved; disturbed bool (3 m,), where something has.
+    Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite
+    while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
+    there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at its
+    last event, the age of it, and what it tends to; tension_now (m,), evaluated at the age of the step;
+    fray_age (m,), when the face got its first broken edge, infinite before. Half-edges: cohesion (3 m,)
+    before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie uint64 (3 m,), a hash of the
+    edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a round of fracture
+    carried over between steps. mean_edge: mean rest length of the edges. rest_lift (n0,): what the film lifts
+    with at tension 1 while nothing round the vertex has moved; disturbed bool (3 m,), where something has.
     """
 
     adhesion: Vectors
@@ -120,7 +120,7 @@ def make_film_rules(parameters: FilmParameters) -> FilmRules:
 
 
 def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -> FilmState:
-    """The film at age 0: all attached, adhesion by noise, cohesion equal but for a scatter and a few defects."""
+    """The film at age 0: attached, adhesion by noise, cohesion equal but for scatter and a few defects."""
     p = parameters
     face_count = len(mesh.faces)
     capacity = 3 * face_count
@@ -167,7 +167,9 @@ def _edge_geometry(mesh: HalfEdgeMesh) -> tuple[Vectors, Vectors, Vectors]:
     corner = mesh.rest_positions[mesh.faces]
     start = corner.reshape(-1, 3)
     end = np.roll(corner, -1, axis=1).reshape(-1, 3)
-    area = np.repeat(0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1), 3)
+    area = np.repeat(
+        0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1), 3
+    )
     paired = mesh.twin >= 0
     edge_area = area / 3.0
     edge_area[paired] += area[mesh.twin[paired]] / 3.0
@@ -185,9 +187,16 @@ def tension_at(value: float, since: float, cap: float, rate: float, saturating: 
 @kernel
 def evaluate_tension(state: FilmState, rules: FilmRules, age: float) -> None:
     """Bring `tension_now` of every face to an age."""
-    tension, tension_age, tension_cap, now = state.tension, state.tension_age, state.tension_cap, state.tension_now
+    tension, tension_age, tension_cap, now = (
+        state.tension,
+        state.tension_age,
+        state.tension_cap,
+        state.tension_now,
+    )
     for f in range(len(now)):
-        now[f] = tension_at(tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age)
+        now[f] = tension_at(
+            tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age
+        )
 
 
 def drying_tension(parameters: FilmParameters, age: float) -> float:

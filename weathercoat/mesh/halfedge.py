@@ -9,7 +9,8 @@ Half-edge h = 3 f + i runs from corner i to corner i + 1 of face f:
      tail ---h---> head             half_edge[v]= one half-edge that starts from v, -1 once v has no face
 
 Invariants, checked by `check_half_edges`:
-- twin is an involution between live faces, and twins run in opposite directions between the same two vertices;
+- twin is an involution between live faces, and twins run in opposite directions between the same two
+  vertices;
 - the live faces round a vertex form one fan (the film is a manifold), so no vertex is shared across a crack;
 - where the fan is open, `half_edge` is its first half-edge counter-clockwise, the one without a twin;
 - faces are never renumbered; a face that is gone is only marked in `alive`, and its twins are -1;
@@ -32,9 +33,10 @@ class HalfEdgeMesh(NamedTuple):
 
     A tuple of plain arrays, so that kernels take it as one argument and change the arrays in place.
 
-    m faces, n0 rest vertices; arrays over vertices have the capacity 3 m, of which `count[0]` are in use.
-    positions: float64 (3 m, 3) in units of the model's size; tail, twin: int32 (3 m,); half_edge, origin: int32
-    (3 m,); alive: bool (m,); rest_positions, rest_normals: float64 (n0, 3); faces: int32 (m, 3), at rest.
+    m faces, n0 rest vertices; arrays over vertices have the capacity 3 m, of which `used[0]` are in use.
+    positions: float64 (3 m, 3) in units of the model's size; tail, twin: int32 (3 m,); half_edge, origin:
+    int32 (3 m,); alive: bool (m,); rest_positions, rest_normals: float64 (n0, 3); faces: int32 (m, 3), at
+    rest.
     """
 
     positions: Vectors
@@ -43,7 +45,7 @@ class HalfEdgeMesh(NamedTuple):
     half_edge: Indices
     origin: Indices
     alive: NDArray[np.bool_]
-    count: NDArray[np.int64]
+    used: NDArray[np.int64]
     rest_positions: Vectors
     rest_normals: Vectors
     faces: Indices
@@ -51,14 +53,14 @@ class HalfEdgeMesh(NamedTuple):
     @property
     def vertex_count(self) -> int:
         """Vertices in use, those without a face included."""
-        return int(self.count[0])
+        return int(self.used[0])
 
 
 class EventLog(NamedTuple):
     """What one step changed, in order: each room brings its own arrays up to date from it.
 
-    splits: int32 (k, 2), the new vertex and its parent; breaks: int32 (k, 2), the two half-edges of a broken edge;
-    falls: int32 (k,), faces that are gone. `counts` holds how many of each are in use.
+    splits: int32 (k, 2), the new vertex and its parent; breaks: int32 (k, 2), the two half-edges of a broken
+    edge; falls: int32 (k,), faces that are gone. `counts` holds how many of each are in use.
     """
 
     splits: Indices
@@ -96,7 +98,8 @@ def make_event_log(face_count: int) -> EventLog:
 def make_half_edges(vertices: Vectors, faces: Indices) -> HalfEdgeMesh:
     """The half-edge structure of a manifold, consistently oriented mesh: vertices (n, 3), faces (m, 3).
 
-    Raises ValueError where an edge has more than two faces, two that run the same way, or a vertex has two fans.
+    Raises ValueError where an edge has more than two faces, two that run the same way, or a vertex has two
+    fans.
     """
     face_count, vertex_count = len(faces), len(vertices)
     capacity = 3 * face_count
@@ -115,7 +118,7 @@ def make_half_edges(vertices: Vectors, faces: Indices) -> HalfEdgeMesh:
         half_edge=half_edge,
         origin=origin,
         alive=np.ones(face_count, np.bool_),
-        count=np.array([vertex_count], np.int64),
+        used=np.array([vertex_count], np.int64),
         rest_positions=np.ascontiguousarray(vertices, np.float64).copy(),
         rest_normals=vertex_normals(vertices, faces),
         faces=np.ascontiguousarray(faces, np.int32).copy(),
@@ -182,10 +185,12 @@ def is_closed(h: int, twin: Indices) -> bool:
 
 @kernel
 def cut_edge(mesh: HalfEdgeMesh, log: EventLog, h: int) -> tuple[bool, bool]:
-    """Part the two faces of the edge of h; returns whether the tail of h, and its head, became the tip of a crack.
+    """Part the two faces of the edge of h; returns whether the tail of h, and its head, became the tip of a
+    crack.
 
-    A vertex whose fan was closed stays one vertex, the tip. One whose fan was open now has two fans: the one that does
-    not hold the cut half-edge that starts there gets a new vertex at the same place, appended to the log's splits.
+    A vertex whose fan was closed stays one vertex, the tip. One whose fan was open now has two fans: the one
+    that does not hold the cut half-edge that starts there gets a new vertex at the same place, appended to
+    the log's splits.
     """
     g = mesh.twin[h]
     tip_tail = is_closed(h, mesh.twin)
@@ -202,13 +207,13 @@ def cut_edge(mesh: HalfEdgeMesh, log: EventLog, h: int) -> tuple[bool, bool]:
 
 @kernel
 def update_fan(mesh: HalfEdgeMesh, log: EventLog, leaving: int, arriving: int, is_tip: bool) -> None:
-    """Bring the vertex from which `leaving` starts up to date, after it was parted from its twin `arriving`."""
+    """Bring the vertex from which `leaving` starts up to date, parted from its twin `arriving`."""
     vertex = mesh.tail[leaving]
     mesh.half_edge[vertex] = leaving
     if is_tip:
         return
-    new = mesh.count[0]
-    mesh.count[0] += 1
+    new = mesh.used[0]
+    mesh.used[0] += 1
     log.splits[log.counts[0], 0] = new
     log.splits[log.counts[0], 1] = vertex
     log.counts[0] += 1

@@ -14,11 +14,13 @@ from weathercoat.mesh.surface import Indices, Place, Surface, Vectors
 
 
 def morton_codes(points: Vectors) -> NDArray[np.uint64]:
-    """Position of each of the points (n, 3) along the Morton curve through their bounding cube, 21 bits an axis."""
+    """Position of each of the points (n, 3) along the Morton curve through their bounding cube, 21 bits an
+    axis.
+    """
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max()) or 1.0
-    # rounded, not floored: grids and symmetric shapes have vertices on the bounds of halves, quarters and so on, where a
-    # last bit would decide
+    # rounded, not floored: grids and symmetric shapes have vertices on the bounds of halves, quarters and so
+    # on, where a last bit would decide
     cell = np.minimum(np.rint((points - low) / extent * 2**21).astype(np.uint64), np.uint64(2**21 - 1))
     code = np.zeros(len(points), np.uint64)
     for axis in range(3):
@@ -36,7 +38,8 @@ def morton_codes(points: Vectors) -> NDArray[np.uint64]:
 
 
 def order_surface(surface: Surface, points: Vectors) -> tuple[Surface, Indices]:
-    """The same surface with vertices and faces along the Morton curve of `points`, its vertices in any frame (n, 3).
+    """The same surface with vertices and faces along the Morton curve of `points`, its vertices in any frame
+    (n, 3).
 
     Faces begin with their smallest vertex. Also returned: for each new face the old one, int32 (m,).
     """

@@ -1,4 +1,6 @@
-"""`Surface`: a triangle mesh with what came with it, as it is handed from reading to remeshing to the simulation."""
+"""`Surface`: a triangle mesh with what came with it, as it is handed from reading to remeshing to the
+simulation.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ Indices = NDArray[np.int32]
 class Place:
     """Where the vertices of a surface lie on the surface that was read.
 
-    face: int32 (n,), a face of the input; barycentric: float64 (n, 3), weights of its three corners, which sum to 1.
+    face: int32 (n,), a face of the input; barycentric: float64 (n, 3), weights of its three corners, which
+    sum to 1.
     """
 
     face: Indices
@@ -28,13 +31,12 @@ class Place:
 class Surface:
     """A triangle mesh in the model's units.
 
-    vertices: float64 (n, 3); faces: int32 (m, 3), counter-clockwise seen from outside.
-    face_group: int32 (m,), for each face an index into `groups`, the names of material groups or objects.
-    uv: float64 (m, 3, 2), a texture coordinate per corner of a face (seams need no duplicate vertices), or None.
-    colors: float64 (n, 4), the input's vertex colours (RGBA, 0 to 1), or None.
-    up: unit vector (3,) against gravity, in the model's axes.
-    notes: repairs that were made and what could not be kept.
-    place: where each vertex lies on the input surface; None for the input itself.
+    vertices: float64 (n, 3); faces: int32 (m, 3), counter-clockwise seen from outside. face_group: int32
+    (m,), for each face an index into `groups`, the names of material groups or objects. uv: float64 (m, 3,
+    2), a texture coordinate per corner of a face (seams need no duplicate vertices), or None. colors: float64
+    (n, 4), the input's vertex colours (RGBA, 0 to 1), or None. up: unit vector (3,) against gravity, in the
+    model's axes. notes: repairs that were made and what could not be kept. place: where each vertex lies on
+    the input surface; None for the input itself.
     """
 
     vertices: Vectors
@@ -71,7 +73,9 @@ class Surface:
         return replace(self, notes=self.notes + notes)
 
     def select_faces(self, keep: NDArray[np.bool_]) -> Surface:
-        """The surface of the faces where `keep` (m,) is true, without the vertices that no face uses any more."""
+        """The surface of the faces where `keep` (m,) is true, without the vertices that no face uses any
+        more.
+        """
         faces = self.faces[keep]
         used, renumbered = np.unique(faces, return_inverse=True)
         place = None if self.place is None else Place(self.place.face[used], self.place.barycentric[used])

@@ -45,8 +45,8 @@ _UP = np.array([0.0, 0.0, 1.0])  # in the simulation's frame
 class Simulation:
     """The state of a run. All lengths inside are in sizes, in the frame of the shape.
 
-    `surface` is the input in the order that the simulation uses; `flake_areas` lists the rest areas, in square sizes, of all
-    flakes that fell; `seconds` sums the time by stage, in the rows of the paper's table.
+    `surface` is the input in the order that the simulation uses; `flake_areas` lists the rest areas, in
+    square sizes, of all flakes that fell; `seconds` sums the time by stage, in the rows of the paper's table.
     """
 
     surface: Surface
@@ -65,7 +65,9 @@ class Simulation:
     duration: float
     step_count: int = 0
     flake_areas: list[float] = field(default_factory=list)
-    seconds: dict[str, float] = field(default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0})
+    seconds: dict[str, float] = field(
+        default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0}
+    )
     log: EventLog = field(init=False)
 
     def __post_init__(self) -> None:
@@ -134,7 +136,9 @@ class Simulation:
             film_rust=self.rust.film[used],
             separated=separated,
             separation_age=np.where(separated, age - np.minimum(self.film.separation_age[used], age), 0.0),
-            adhesion=np.where(separated, 0.0, adhesion_at(self.film.adhesion, self.film_parameters, age)[origin]),
+            adhesion=np.where(
+                separated, 0.0, adhesion_at(self.film.adhesion, self.film_parameters, age)[origin]
+            ),
             film_color=stain_color(self.palette.paint, self.palette, self.rust.film[used], dust[origin]),
             substrate_vertices=self.surface.vertices,
             substrate_normals=frame.turn(mesh.rest_normals),
@@ -167,8 +171,8 @@ def make_simulation(
 ) -> Simulation:
     """A simulation of a manifold, oriented surface, at age 0; `duration` is the age that `steps` steps cover.
 
-    `frame` is that of the surface itself unless given; give the input's, where the surface is a remeshed one, so that noise lies
-    alike at every resolution.
+    `frame` is that of the surface itself unless given; give the input's, where the surface is a remeshed one,
+    so that noise lies alike at every resolution.
     """
     frame = frame or make_frame(surface)
     ordered, _ = order_surface(surface, frame.localise(surface.vertices))

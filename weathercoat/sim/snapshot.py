@@ -15,10 +15,11 @@ class Snapshot:
     """Film and substrate after `step` steps, at `age`.
 
     Film, n vertices and m faces, without the flakes that have fallen; no vertex is shared across a crack:
-    film_vertices float64 (n, 3) in model units; film_faces int32 (m, 3); film_face int32 (m,), the substrate face that
-    each film face covered at the start; film_origin int32 (n,), the substrate vertex each film vertex stems from;
-    film_rust (n,) runoff rust 0 to 1; separated bool (n,); separation_age (n,), age since the vertex separated
-    (0 while attached); adhesion (n,), what holds it still; film_color float64 (n, 3), sRGB 0 to 1.
+    film_vertices float64 (n, 3) in model units; film_faces int32 (m, 3); film_face int32 (m,), the substrate
+    face that each film face covered at the start; film_origin int32 (n,), the substrate vertex each film
+    vertex stems from; film_rust (n,) runoff rust 0 to 1; separated bool (n,); separation_age (n,), age since
+    the vertex separated (0 while attached); adhesion (n,), what holds it still; film_color float64 (n, 3),
+    sRGB 0 to 1.
 
     Substrate, the mesh at the start: substrate_vertices, substrate_normals (outward, unit), substrate_faces;
     substrate_rust and dust (0 to 1), bare bool (all film gone from the vertex), substrate_color, per vertex.

@@ -19,7 +19,9 @@ class Palette:
 
 
 def stain_color(base: tuple[float, float, float], palette: Palette, rust: Vectors, dust: Vectors) -> Vectors:
-    """Colour of a surface with rust and dust (n,): towards rust by 1 - exp(-(rust - 0.1)), times exp(-dust), (n, 3)."""
+    """Colour of a surface with rust and dust (n,): towards rust by 1 - exp(-(rust - 0.1)), times exp(-dust),
+    (n, 3).
+    """
     share = -np.expm1(-np.maximum(rust - 0.1, 0.0))[:, None]
     mixed = (1.0 - share) * np.asarray(base) + share * np.asarray(palette.rust)
     return np.clip(mixed * np.exp(-dust)[:, None], 0.0, 1.0)

@@ -1,4 +1,6 @@
-"""Dust: a veil on surfaces that look up, in hollows, low on the object (paper 3.2, after Ishitobi et al. 2020)."""
+"""Dust: a veil on surfaces that look up, in hollows, low on the object (paper 3.2, after Ishitobi et al.
+2020).
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ from weathercoat.mesh.surface import Vectors
 def dust_exposure(mesh: HalfEdgeMesh, up: Vectors) -> Vectors:
     """How readily dust stays on each rest vertex, 0 to 1, (n0,).
 
-    Height (1 at the lowest point, 0 at the highest, along `up`) times slope, (1 - g . n) / 2 with gravity g = -up, times
-    concavity, 1 - phi / 2 pi with phi the mean outer dihedral of the edges there.
+    Height (1 at the lowest point, 0 at the highest, along `up`) times slope, (1 - g . n) / 2 with gravity g =
+    -up, times concavity, 1 - phi / 2 pi with phi the mean outer dihedral of the edges there.
     """
     height = np.sum(mesh.rest_positions * up, axis=1)
     low, high = float(height.min()), float(height.max())

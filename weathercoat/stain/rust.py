@@ -1,7 +1,8 @@
 """Rust: on the metal where the film has lifted or is gone, and running down the film from cracks (paper 3.2).
 
-Runoff follows Ishitobi et al., 2020: sources pass their rust on along the film, downhill. Speeds are lengths per age and a
-streak fades over a length, so that neither the mesh nor the number of steps sets how far it runs.
+Runoff follows Ishitobi et al., 2020: sources pass their rust on along the film, downhill. Speeds are lengths
+per age and a streak fades over a length, so that neither the mesh nor the number of steps sets how far it
+runs.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from weathercoat.mesh.surface import Indices, Vectors
 
 @dataclass(frozen=True)
 class StainParameters:
-    """How stains grow. Lengths in sizes, rates per unit of age; the names are those of the config's sections."""
+    """How stains grow. Lengths in sizes, rates per unit of age; named as the config's sections."""
 
     dust_rate: float = 0.5
     rust_threshold: float = 0.1
@@ -37,8 +38,9 @@ class StainParameters:
 class RustState(NamedTuple):
     """Rust on film and metal. n0 rest vertices; arrays over film vertices have the capacity 3 m.
 
-    film: (3 m,), runoff rust, 0 to 1; source: bool (3 m,); lifted_age, bare_age: (n0,), the age at which the film first
-    lifted off the metal there, and since when it is gone, infinite before; film_corners: int32 (n0,), corners of live film faces on it.
+    film: (3 m,), runoff rust, 0 to 1; source: bool (3 m,); lifted_age, bare_age: (n0,), the age at which the
+    film first lifted off the metal there, and since when it is gone, infinite before; film_corners: int32
+    (n0,), corners of live film faces on it.
     """
 
     film: Vectors
@@ -79,7 +81,9 @@ def expose_lifted(mesh: HalfEdgeMesh, rust: RustState, vertices: Indices, age: f
 
 @kernel
 def follow_events(mesh: HalfEdgeMesh, rust: RustState, log: EventLog, up: Vectors, age: float) -> None:
-    """Bring rust up to date with a step's log: copies inherit, new outlines get sources, fallen film bares the metal."""
+    """Bring rust up to date with a step's log: copies inherit, new outlines get sources, fallen film bares
+    the metal.
+    """
     for i in range(log.counts[0]):
         rust.film[log.splits[i, 0]] = rust.film[log.splits[i, 1]]
         rust.source[log.splits[i, 0]] = rust.source[log.splits[i, 1]]
@@ -102,7 +106,9 @@ def rest_height(mesh: HalfEdgeMesh, v: int, up: Vectors) -> float:
     """Height of film vertex v at rest."""
     o = mesh.origin[v]
     return (
-        mesh.rest_positions[o, 0] * up[0] + mesh.rest_positions[o, 1] * up[1] + mesh.rest_positions[o, 2] * up[2]
+        mesh.rest_positions[o, 0] * up[0]
+        + mesh.rest_positions[o, 1] * up[1]
+        + mesh.rest_positions[o, 2] * up[2]
     )
 
 
@@ -123,12 +129,18 @@ def mark_source(mesh: HalfEdgeMesh, rust: RustState, v: int, up: Vectors) -> Non
 
 @kernel
 def run_off(
-    mesh: HalfEdgeMesh, rust: RustState, numbers: RunoffNumbers, up: Vectors, duration: float, vertices: Indices
+    mesh: HalfEdgeMesh,
+    rust: RustState,
+    numbers: RunoffNumbers,
+    up: Vectors,
+    duration: float,
+    vertices: Indices,
 ) -> None:
-    """Let sources grow and rust run for `duration` down from each of the vertices, which come from the highest to the lowest.
+    """Let sources grow and rust run for `duration` down from each of the vertices, which come from the
+    highest to the lowest.
 
-    The neighbour best aligned with gravity along the surface takes over the rust above it, less what fades on the way;
-    the other neighbours below take a small share of that.
+    The neighbour best aligned with gravity along the surface takes over the rust above it, less what fades on
+    the way; the other neighbours below take a small share of that.
     """
     grown = -math.expm1(-numbers.source_rate * duration)
     for v in vertices:
@@ -156,7 +168,9 @@ def run_off(
                         share = 1.0 if other == best else numbers.side_share
                         wanted = rust.film[v] * math.exp(-length / numbers.runoff_length) - rust.film[other]
                         if wanted > 0.0:
-                            rust.film[other] += share * wanted * -math.expm1(-numbers.runoff_speed / length * duration)
+                            rust.film[other] += (
+                                share * wanted * -math.expm1(-numbers.runoff_speed / length * duration)
+                            )
                 leaving = mesh.twin[arriving]
                 if leaving == first:
                     break
@@ -164,7 +178,8 @@ def run_off(
 
 @kernel
 def downhill(mesh: HalfEdgeMesh, v: int, other: int, up: Vectors) -> tuple[float, float]:
-    """Cosine between the rest edge from v to another vertex and gravity along the surface at v, and the edge's length.
+    """Cosine between the rest edge from v to another vertex and gravity along the surface at v, and the
+    edge's length.
 
     The cosine is 0 where the surface is level.
     """
@@ -210,7 +225,9 @@ def stain(
 
 
 def metal_rust_at(rust: RustState, parameters: StainParameters, age: float) -> Vectors:
-    """Rust of the metal under each rest vertex at an age, 0 to 1, (n0,): slow under lifted film, fast where it is bare."""
+    """Rust of the metal under each rest vertex at an age, 0 to 1, (n0,): slow under lifted film, fast where
+    it is bare.
+    """
     lifted = np.clip(np.minimum(age, rust.bare_age) - rust.lifted_age, 0.0, None)
     bare = np.clip(age - rust.bare_age, 0.0, None)
     return -np.expm1(-parameters.rust_lifted_rate * lifted - parameters.rust_bare_rate * bare)
