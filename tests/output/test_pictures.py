@@ -149,6 +149,17 @@ def test_a_plate_is_seen_from_its_normal_side(facing: tuple[int, int, int]) -> N
     assert (camera.position - points.mean(axis=0)) @ normal > 0
 
 
+def test_a_half_pipe_is_seen_from_outside_and_a_closed_sheet_from_its_front() -> None:
+    angle = np.linspace(0.0, np.pi, 41)
+    normals = np.stack([np.cos(angle), 0 * angle, -np.sin(angle)], axis=1)
+    view = {"aspect": 1.2, "azimuth": 32.0, "elevation": 24.0, "margin": 0.06}
+    outside = make_camera(normals, normals, (0.0, 1.0, 0.0), **view)
+    assert outside.forward[2] > 0.5
+    plate_points = np.random.default_rng(0).uniform(-1, 1, (40, 3)) * [1.0, 1.0, 0.02]
+    both_sides = np.tile([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], (20, 1))
+    assert make_camera(plate_points, both_sides, (0.0, 1.0, 0.0), **view).forward[2] < -0.5
+
+
 def test_the_camera_of_a_run_does_not_depend_on_the_film() -> None:
     first, last = frame_camera(plate(0.1), SMALL), frame_camera(plate(0.9), SMALL)
     assert np.array_equal(first.position, last.position) and np.array_equal(first.forward, last.forward)

@@ -97,12 +97,13 @@ def _facing(normals: Vectors, preferred: Vectors) -> Vectors | None:
     """The side that a plate faces (`preferred` decides between two alike); None for what is no plate."""
     if len(normals) == 0:
         return None
+    mean = normals.mean(axis=0)
+    if np.linalg.norm(mean) > 0.4:  # an open sheet, however curved: closed surfaces come near 0
+        return _unit(mean)
     share, axes = np.linalg.eigh(normals.T @ normals / len(normals))
     if share[2] < 0.7:
         return None
-    axis = axes[:, 2]
-    mean = float(axis @ normals.mean(axis=0))
-    return axis if (mean if abs(mean) > 0.3 else axis @ preferred) > 0.0 else -axis
+    return axes[:, 2] * (1.0 if axes[:, 2] @ preferred > 0.0 else -1.0)
 
 
 def _front(upward: Vectors) -> Vectors:
