@@ -17,15 +17,20 @@ class Recorder:
 
 
 def run_simulation(
-    simulation: Simulation, recorders: Sequence[Recorder], progress: Callable[[int, int], None] | None = None
+    simulation: Simulation,
+    recorders: Sequence[Recorder],
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    until: int | None = None,
 ) -> None:
-    """Step to the end; `progress` is called with the steps done and their number."""
+    """Step to the end, or to the step `until`; `progress` is called with the steps done and their number."""
+    last = simulation.steps if until is None else min(until, simulation.steps)
     _record(simulation, recorders)
-    while simulation.step_count < simulation.steps:
+    while simulation.step_count < last:
         simulation.step()
         _record(simulation, recorders)
         if progress is not None:
-            progress(simulation.step_count, simulation.steps)
+            progress(simulation.step_count, last)
 
 
 def _record(simulation: Simulation, recorders: Sequence[Recorder]) -> None:
