@@ -21,7 +21,7 @@ SPHERE_AREA = 12.3298
 class Expected:
     """What reading a file must give.
 
-    code: of the error, else None. notes: code to count, and no others. positions: distinct positions of the vertices.
+    code: of the error, else None. notes: codes with counts, and no others. positions: distinct ones.
     says: what the message must hold.
     """
 
@@ -202,7 +202,9 @@ SYNTHETIC = {
     "ply_inf_vertex.ply": good(315, 161, "W-NONFINITE(1) W-BOUNDARY(5)", area=12.1497),
     "ply_nan_unreferenced.ply": sphere("W-UNREFERENCED(1)"),
     "ply_random_bytes.ply": fails("E-FORMAT", "binary data"),
-    "ply_truncated_body.ply": fails("E-CORRUPT", "the header says 320 rows of element face, the file holds 78"),
+    "ply_truncated_body.ply": fails(
+        "E-CORRUPT", "the header says 320 rows of element face, the file holds 78"
+    ),
     "stl_ascii_truncated.stl": fails("E-CORRUPT", "line 6"),
     "stl_binary_says_solid.stl": sphere(),
     "stl_count_too_big.stl": fails("E-CORRUPT", "the header says 4000000000 faces, the file holds 320"),
@@ -266,7 +268,7 @@ def test_file_ends_as_expected(meshes_folder: Path, name: str, expected: Expecte
 
 
 def test_clean_files_have_the_counts_of_the_index(meshes_folder: Path) -> None:
-    """Where nothing had to be repaired, faces, vertices, components and Euler number are the index's own figures."""
+    """Where nothing had to be repaired, all counts are the index's own figures."""
     checked = 0
     for row in rows(meshes_folder / "index.tsv"):
         expected = REAL[row["file"]]

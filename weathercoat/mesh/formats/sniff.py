@@ -110,10 +110,8 @@ def _by_extension(data: bytes, extension: str) -> str:
     ):
         return "stl"
     if start is None:
-        utf16 = len(data) >= 4 and (data[:64:2].count(0) > 24 or data[1:64:2].count(0) > 24)
-        raise FormatError(
-            "looks like " + ("UTF-16 text without a byte order mark" if utf16 else "binary data")
-        )
+        seems = "UTF-16 text without a byte order mark" if _is_unmarked_utf16(data) else "binary data"
+        raise FormatError(f"looks like {seems}")
     if extension == "obj" and _only_comments(start):
         return "obj"
     if extension == "off" and start.split()[:1] == [b"OFF"]:
@@ -121,6 +119,12 @@ def _by_extension(data: bytes, extension: str) -> str:
     raise FormatError(
         "looks like text" + (f", but not like {extension.upper()}" if extension else " of no known format")
     )
+
+
+def _is_unmarked_utf16(data: bytes) -> bool:
+    """Whether nearly every second byte is zero, and hardly any of the others."""
+    even, odd = (data[i:1024:2].count(0) / max(len(data[i:1024:2]), 1) for i in (0, 1))
+    return max(even, odd) > 0.9 and min(even, odd) < 0.1
 
 
 def _only_comments(start: bytes) -> bool:
