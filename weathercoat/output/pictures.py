@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ class PictureParameters:
     height: int = 430
     azimuth: float = 32.0
     elevation: float = 24.0
-    margin: float = 0.06
+    margin: float = 0.1
     samples: int = 2
     sky_rays: int = 3
     key_rays: int = 1
@@ -266,11 +267,11 @@ def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int) 
     return np.asarray(sheet)
 
 
-def write_png(path: Path, image: Image) -> None:
-    """Write an image (h, w, 3) uint8 as PNG; `OutputError` if the file cannot be written."""
+def write_png(target: Path | BinaryIO, image: Image) -> None:
+    """Write an image (h, w, 3) uint8 as PNG; `OutputError` if the target cannot be written."""
     from PIL import Image as Pillow
 
     try:
-        Pillow.fromarray(image).save(path, format="PNG", optimize=False, compress_level=6)
+        Pillow.fromarray(image).save(target, format="PNG")
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
