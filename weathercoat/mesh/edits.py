@@ -193,7 +193,7 @@ def _common_neighbours(a: int, b: int, mesh: EditableMesh) -> int:
 
 @kernel
 def _side_allows(h: int, mesh: EditableMesh) -> bool:
-    """Whether the face of h may vanish: its apex keeps faces enough, its other sides are not features both."""
+    """Whether the face of h may vanish: its apex keeps enough faces, its other sides are no features both."""
     if mesh.crease[next_of(h)] >= 0 and mesh.crease[prev_of(h)] >= 0:
         return False
     count, closed = face_count_at(mesh.tail[prev_of(h)], mesh)

@@ -50,7 +50,7 @@ class InputSurface:
 def walk_to(
     goal: Vectors, start: int, vertices: Vectors, faces: Indices, twin: Indices, crease: Indices, out: Vectors
 ) -> int:
-    """Go from face `start` to ever closer faces, across no feature; writes the nearest point to `out` (3,)."""
+    """Go from face `start` to closer faces, across no feature; writes the nearest point to `out` (3,)."""
     best = start
     trial = np.empty(3)
     distance = closest_on_face(goal, start, vertices, faces, out)

@@ -92,7 +92,7 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
         face_group=ordered.face_group[mesh.source],
         uv=None,
         colors=None,
-        place=Place(old_face[face], barycentric),
+        place=Place(old_face[face], _turn_back(barycentric, ordered, face, surface, old_face[face])),
     )
     if abs(count - parameters.faces) > 0.02 * parameters.faces:
         message = (
@@ -100,6 +100,15 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
         )
         result = result.with_notes(Note("W-FACES", count, message))
     return order_surface(result, mesh.position)[0]
+
+
+def _turn_back(
+    barycentric: Vectors, ordered: Surface, face: Indices, surface: Surface, old_face: Indices
+) -> Vectors:
+    """The weights (n, 3) of the corners of the ordered faces (n,) as weights of those of the input's faces (n,)."""
+    begins = ordered.vertices[ordered.faces[face, 0]][:, None]
+    corner = np.argmax(np.all(surface.vertices[surface.faces[old_face]] == begins, axis=2), axis=1)
+    return np.take_along_axis(barycentric, (np.arange(3) - corner[:, None]) % 3, axis=1)
 
 
 def _rounded(points: Vectors) -> Vectors:
