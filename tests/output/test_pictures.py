@@ -172,6 +172,14 @@ def test_intact_paint_has_the_hue_of_the_paint() -> None:
     assert red[0] > 2.0 * red[1] and red[0] > 2.0 * red[2]
 
 
+def test_a_film_without_thickness_still_covers_metal_and_back() -> None:
+    red = replace(SMALL, paint=(0.7, 0.1, 0.1))
+    thin = render_snapshot(plate(0.0), replace(red, film_thickness=0.0))
+    h, w = thin.shape[:2]
+    part = thin[h // 3 : 2 * h // 3, w // 3 : 2 * w // 3].astype(float)
+    assert (part[..., 0] > 2.0 * part[..., 1]).all()
+
+
 def test_rust_grows_from_nothing_over_patches_to_a_cover() -> None:
     def orange(amount: float) -> np.ndarray:
         image = render_snapshot(without_film(plate(0.5), amount), replace(SMALL, width=240, height=200))

@@ -16,6 +16,7 @@ from weathercoat.output.shell import corner_normals, make_shell, open_edges, smo
 from weathercoat.sim.snapshot import Snapshot
 
 _GAP = 0.25  # of the film's thickness: it floats this far above the metal, so that no two surfaces coincide
+_LEAST_THICKNESS = 8e-4  # in sizes: a thinner film would flicker with its back and the metal
 _BEVEL = 0.4  # of the film's thickness
 _OUTLINE_PASSES = 1
 _FILM_CREASE = np.radians(60.0)  # curls on coarse meshes turn by more than a crease of the metal does
@@ -162,6 +163,7 @@ def _film(
     snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors
 ) -> list[DisplayMesh]:
     """Front, back and rim of the film."""
+    thickness = max(thickness, _LEAST_THICKNESS)
     origin = snapshot.film_origin
     fixed = np.bincount(origin, minlength=len(rest)) > 2
     fixed[open_edges(snapshot.substrate_faces)[0]] = True
