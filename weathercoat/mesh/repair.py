@@ -164,7 +164,8 @@ def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tu
     # A lattice on which points within the tolerance are at most two steps apart: of the leading bits, or
     # even.
     bits = np.abs(points).view(np.int64) >> (52 - 23)
-    even = (points - low) / np.where(extent > 0, SINGLE * extent, 1.0)
+    step = SINGLE * extent
+    even = (points - low) / np.where(step > 0, step, 1.0)
     lattice = np.where(is_far, even.astype(np.int64), np.where(points < 0, -bits, bits))
     first = np.empty(len(points), np.int64)
     within = np.zeros(len(points), np.int64) if part is None else part[used]
