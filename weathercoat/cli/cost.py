@@ -1,7 +1,8 @@
 """What a run will take: a linear model of measured rates, for `inspect`.
 
-The rates are those of one core of the kind that continuous integration runs on; a run on another machine
-takes proportionally more or less. Measured on closed and open parts at 3,000 to 300,000 faces.
+The rates are those of one core of a busy two-core machine, a sign plate at 3,000 to 30,000 faces and compiled
+kernels; another machine takes proportionally more or less. The first run after an installation compiles for
+about half a minute more, which is left out.
 """
 
 from __future__ import annotations
@@ -10,14 +11,15 @@ from dataclasses import dataclass
 
 from weathercoat.config.schema import Config
 
-SECONDS_AT_START = 3.0
-SECONDS_PER_REMESHED_FACE = 1.5e-4
-SECONDS_PER_FACE_AND_STEP = 2.0e-7
-SECONDS_PER_FACE_AND_SWEEP = 5.0e-8
-SECONDS_PER_SNAPSHOT_FACE = 3.0e-5
-SECONDS_PER_PICTURE_PIXEL = 8.0e-6
-BYTES_AT_START = 250e6
-BYTES_PER_FACE = 4.0e3
+SECONDS_AT_START = 1.5
+SECONDS_PER_REMESHED_FACE = 6e-5
+SECONDS_PER_FACE_AND_STEP = 2.7e-7
+SECONDS_PER_FACE_AND_SWEEP = 3e-8
+SECONDS_PER_SNAPSHOT_FACE = 5e-6
+SECONDS_PER_PICTURE_PIXEL = 2.1e-6
+BYTES_AT_START = 200e6
+BYTES_PER_FACE = 1.5e3
+BYTES_PER_PICTURE_PIXEL = 400
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,13 @@ def estimate_cost(config: Config, model_faces: int) -> Cost:
     faces = config.remesh.faces if config.remesh else model_faces
     steps = config.ageing.steps
     snapshots = len(config.snapshots.due(steps))
-    seconds = SECONDS_AT_START + snapshots * faces * SECONDS_PER_SNAPSHOT_FACE
-    seconds += (
-        steps * faces * (SECONDS_PER_FACE_AND_STEP + config.deformation.sweeps * SECONDS_PER_FACE_AND_SWEEP)
-    )
+    per_step = SECONDS_PER_FACE_AND_STEP + config.deformation.sweeps * SECONDS_PER_FACE_AND_SWEEP
+    seconds = SECONDS_AT_START + faces * (steps * per_step + snapshots * SECONDS_PER_SNAPSHOT_FACE)
+    memory = BYTES_AT_START + BYTES_PER_FACE * max(faces, model_faces)
     if config.remesh:
         seconds += faces * SECONDS_PER_REMESHED_FACE
     if config.output.preview:
         pixels = config.output.picture_width * config.output.picture_height
         seconds += snapshots * pixels * SECONDS_PER_PICTURE_PIXEL
-    return Cost(seconds, BYTES_AT_START + BYTES_PER_FACE * max(faces, model_faces))
+        memory += pixels * BYTES_PER_PICTURE_PIXEL
+    return Cost(seconds, memory)
