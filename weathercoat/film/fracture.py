@@ -10,7 +10,7 @@ import numpy as np
 
 from weathercoat.compile import kernel
 from weathercoat.film.state import FilmParameters, FilmRules, FilmState, inherit_film, make_film_rules
-from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge
+from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
 _REACH = 3.0  # shear lags beyond which a crack no longer unloads the film: exp(-3) is 5 %
@@ -40,11 +40,16 @@ def fracture(
     overload = np.empty(len(mesh.twin))
     candidates = np.empty(len(mesh.twin), np.int32)
     stack = np.empty(len(mesh.twin), np.int32)
-    for _ in range(rounds):
-        found = find_overloaded(mesh, state, rules, age, candidates, overload)
+    first_break = int(log.counts[1])
+    for number in range(rounds):
+        if number == 0:
+            found = find_overloaded(mesh, state, rules, age, candidates, overload)
+        else:
+            found = find_overloaded_at_tips(mesh, state, rules, age, log, first_break, candidates, overload)
         if found == 0:
             return
         order = np.lexsort((state.tie[candidates[:found]], -overload[:found]))
+        first_break = int(log.counts[1])
         break_in_order(mesh, state, rules, age, candidates[:found][order], log, stack)
 
 
@@ -125,6 +130,41 @@ def find_overloaded(
 
 
 @kernel
+def find_overloaded_at_tips(
+    mesh: HalfEdgeMesh,
+    state: FilmState,
+    rules: FilmRules,
+    age: float,
+    log: EventLog,
+    first_break: int,
+    candidates: Indices,
+    overload: Vectors,
+) -> int:
+    """As `find_overloaded`, of the edges at the tips that the log's breaks from `first_break` on have made.
+
+    Within a step tensions only fall and cohesion stays, so no other edge can have become overloaded. An edge
+    between two tips is found at both.
+    """
+    found = 0
+    for i in range(first_break, log.counts[1]):
+        for side in range(2):
+            tip = mesh.tail[log.breaks[i, side]]
+            if not state.is_tip[tip]:
+                continue
+            leaving = mesh.half_edge[tip]
+            while leaving >= 0:
+                g = mesh.twin[leaving]
+                if g >= 0 and state.separated[mesh.tail[g]]:
+                    load = edge_overload(mesh, state, rules, leaving, age)
+                    if load > 1.0:
+                        candidates[found] = min(leaving, g)
+                        overload[found] = load
+                        found += 1
+                leaving = mesh.twin[prev_of(leaving)]
+    return found
+
+
+@kernel
 def break_in_order(
     mesh: HalfEdgeMesh,
     state: FilmState,
@@ -136,7 +176,7 @@ def break_in_order(
 ) -> None:
     """Break the edges one after another, each where it is still overloaded."""
     for h in half_edges:
-        if edge_overload(mesh, state, rules, h, age) > 1.0:
+        if mesh.twin[h] >= 0 and edge_overload(mesh, state, rules, h, age) > 1.0:
             break_edge(mesh, state, rules, age, h, log, stack)
 
 
