@@ -1,6 +1,6 @@
 """Says where the packages lie; all else is in pyproject.toml.
 
-The shipped configs live in `configs/`, where people look for them, and are installed as `weathercoat/configs`.
+The shipped configs live in `configs/`, where people look for them, and install as `weathercoat/configs`.
 """
 
 from setuptools import find_packages, setup
