@@ -9,6 +9,7 @@ weathercoat.write("aged.glb", simulation.snapshot())
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,7 +22,5 @@ __all__ = ["read", "remesh", "simulate", "write"]
 def __getattr__(name: str) -> Any:
     # imported when first used, so that the command line answers --help without NumPy
     if name in __all__:
-        from weathercoat import api
-
-        return getattr(api, name)
+        return getattr(importlib.import_module("weathercoat.api"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -33,5 +33,5 @@ import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` at its first call: cached on disk, IEEE arithmetic, no check for division by zero."""
+    """Compile `function` at its first call: cached on disk, IEEE arithmetic, no check for zero divisors."""
     return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
