@@ -32,7 +32,7 @@ _SAMPLES = 40_000
 
 @dataclass(frozen=True)
 class Edges:
-    """Unique edges: ends (k, 2), the faces beside them (k, 2) with -1 for none, and how many faces they have (k,)."""
+    """Unique edges: ends (k, 2), two faces beside them (k, 2) or -1, and how many faces they have (k,)."""
 
     ends: NDArray[np.int64]
     faces: NDArray[np.int64]
@@ -121,7 +121,7 @@ def _count_fans(faces: NDArray[np.int32], edges: Edges) -> NDArray[np.int64]:
 
 
 def count_bad_faces(surface: Surface, source: Surface) -> tuple[int, int]:
-    """How many faces are flipped against the input below their centre, and how many are degenerate (under 0.1°)."""
+    """Faces that are flipped against the input below their centre, and degenerate ones (under 0.1°)."""
     import igl
 
     centre = surface.vertices[surface.faces].mean(axis=1)
@@ -155,7 +155,7 @@ def flat_part_order(surface: Surface, least: int = 1000) -> tuple[float, float, 
 
 
 def line_distance(surface: Surface, source: Surface) -> float:
-    """Largest distance of vertices of `surface` on creases above 30° or boundaries from such lines of `source`."""
+    """Largest distance of the vertices on creases above 30° or boundaries from such lines of `source`."""
     import igl
 
     edges, lines = find_edges(surface.faces), find_edges(source.faces)

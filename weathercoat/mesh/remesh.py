@@ -4,8 +4,9 @@ The loop is that of Botsch and Kobbelt, A remeshing approach to multiresolution 
 edges, collapse short ones, flip, smooth in the tangent plane and project on the input. What is added: the
 first splits are at random places in random order, so that no grid or strip of the input shows in the
 directions of the new edges (cracks run along them); flips weigh the Delaunay criterion against regular
-valences, and smoothing has springs, which makes edges more even than either alone; features are chains that
-their vertices slide on; and the number of faces is met by feedback.
+valences, and smoothing has springs, which makes edges more even than either alone; discs are turned on flat
+parts until no direction of edges is preferred; features are chains that their vertices slide on; and the
+number of faces is met by feedback.
 
 Everything happens in the frame of the shape with coordinates rounded there, so that moving, scaling,
 turning or renumbering the input does not change the result by more than its last digits.
@@ -25,6 +26,7 @@ from weathercoat.mesh.edits import collapse_pass, edge_lengths, face_shapes, fli
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.halfedge import make_twins
 from weathercoat.mesh.order import order_surface
+from weathercoat.mesh.orientation import balance_directions, find_flat_parts
 from weathercoat.mesh.projection import InputSurface, barycentric_of
 from weathercoat.mesh.smoothing import apply_moves, fan_normals, smooth
 from weathercoat.mesh.surface import Indices, Place, Surface, Vectors, face_areas
@@ -38,7 +40,7 @@ _MOST_SHUFFLES = (
     100  # passes of random splits, more than the longest edge that the limit of faces allows can need
 )
 _SPRING = 0.5  # weight of springs against the mean of the neighbours
-_REGULARITY = 0.3  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
+_REGULARITY = 0.5  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
 _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the short crease beside them
 _SHORT_CREASE = 6.0  # target lengths; longer creases are kept in any case
 
@@ -157,6 +159,9 @@ def _iterate(
     random = _stream(parameters.seed, "remesh")
     mesh = _shuffle(mesh, features, source, edge_length, random)
     length = edge_length
+    parts = find_flat_parts(
+        source.normals, face_areas(source.vertices, source.faces), source.twin, edge_length
+    )
     for number in range(parameters.iterations):
         mesh = _split(mesh, features, length * _SPLIT, length * _SPLIT, random)
         mesh = _collapse(mesh, features, source, length, random)
@@ -167,6 +172,8 @@ def _iterate(
             flip_edges(mesh, source.normals, 5, _REGULARITY)
         if number in (parameters.iterations // 3, parameters.iterations // 2):
             _release_poor_creases(mesh, features, edge_length)
+        if parameters.iterations // 2 <= number and (parameters.iterations - number) % 2 == 0:
+            balance_directions(mesh, features, source.normals, parts, edge_length, _REGULARITY, random)
     return mesh
 
 
