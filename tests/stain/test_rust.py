@@ -216,6 +216,30 @@ def test_the_numbering_has_no_part_in_it(seed: int) -> None:
     assert (plain > 0.1).sum() >= 3
 
 
+def test_last_bits_do_not_decide_where_rust_runs() -> None:
+    """On a lattice much is level and much equally steep; errors of 1e-14 in the positions must not choose."""
+    plain = run(HEXAGON, [at(-1), at(0), at(1)], UP_Y, age=2.0, steps=50)
+    for seed in range(5):
+        error = np.random.default_rng(seed).uniform(-1e-14, 1e-14, HEXAGON.vertices.shape)
+        moved = replace(HEXAGON, vertices=HEXAGON.vertices + error)
+        film = run(moved, [at(-1), at(0), at(1)], UP_Y, age=2.0, steps=50)
+        np.testing.assert_allclose(film, plain, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_last_bits_do_not_make_sources(seed: int) -> None:
+    """A level slit has no lower end, however its ends round."""
+    error = np.random.default_rng(seed).uniform(-1e-14, 1e-14, HEXAGON.vertices.shape)
+    mesh, log = (
+        make_mesh(replace(HEXAGON, vertices=HEXAGON.vertices + error)),
+        make_event_log(len(HEXAGON.faces)),
+    )
+    rust = make_rust_state(mesh)
+    cut_edge(mesh, log, zoo.find_edge(mesh, at(0), at(1)))
+    follow_events(mesh, rust, log, UP_Y, 0.5)
+    assert not rust.source.any()
+
+
 def test_side_neighbours_get_a_small_share() -> None:
     """Straight down in the lattice two ways are equally good (30 degrees off): one takes over, the other a thousandth."""
     film = run(HEXAGON, [at(0)], UP_Y, age=0.01, steps=1, parameters=replace(STAIN, rust_source_rate=1e9))

@@ -18,6 +18,8 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
+_LEVEL = 1e-9  # heights in sizes, and cosines, that differ by less are equal: on a grid last bits would decide
+
 
 @dataclass(frozen=True)
 class StainParameters:
@@ -121,7 +123,7 @@ def mark_source(mesh: HalfEdgeMesh, rust: RustState, v: int, up: Vectors) -> Non
     last = first
     while mesh.twin[prev_of(last)] >= 0:
         last = mesh.twin[prev_of(last)]
-    height = rest_height(mesh, v, up)
+    height = rest_height(mesh, v, up) + _LEVEL
     after, before = mesh.tail[next_of(first)], mesh.tail[prev_of(last)]
     if height < rest_height(mesh, after, up) and height < rest_height(mesh, before, up):
         rust.source[v] = True
@@ -162,7 +164,7 @@ def run_off(
                     if alignment <= numbers.alignment:
                         continue
                     if turn == 0:
-                        if alignment > best_alignment:
+                        if alignment > best_alignment + _LEVEL:
                             best, best_alignment = other, alignment
                     else:
                         share = 1.0 if other == best else numbers.side_share
@@ -221,7 +223,7 @@ def stain(
         p.rust_alignment,
         p.rust_side_share,
     )
-    run_off(mesh, rust, numbers, up, duration, running[np.argsort(-height, kind="stable")])
+    run_off(mesh, rust, numbers, up, duration, running[np.argsort(-np.rint(height / _LEVEL), kind="stable")])
 
 
 def metal_rust_at(rust: RustState, parameters: StainParameters, age: float) -> Vectors:
