@@ -32,6 +32,14 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
 
 
+def is_cold() -> bool:
+    """Whether no kernel of this state of the package has been compiled yet, so that the next run takes
+    longer.
+    """
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    return next(folder.rglob("*.nbi"), None) is None
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call: cached on disk, IEEE arithmetic, no check for zero divisors."""
     return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]

@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
+from weathercoat.compile import is_cold
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.deform.sweeps import DeformParameters
@@ -84,6 +85,8 @@ def run_asset(
     config = loaded.config
     say = log or (lambda line: None)
     watch = Stopwatch()
+    if is_cold():
+        say("compiling on this first run, which takes about a minute; later runs start at once")
     with run_folder.RunFolder(out, overwrite=overwrite) as folder:
         with watch.time("read"):
             surface, inputs = _read(model, format, config)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,7 +58,8 @@ def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
             )
     config = _config_of(report, run / REPORT)
     parameters = replace(picture_parameters(config), **view)
-    up = _up_of(report, config)
+    x, y, z = report["meshes"]["input"]["up"]
+    up = (x, y, z)
     untouched = run / "untouched.ply"
     unpainted = read_surface(untouched) if untouched.exists() else None
     camera = frame_camera(snapshots[0], parameters, up=up)
@@ -81,19 +81,3 @@ def _config_of(report: dict[str, Any], path: Path) -> Config:
         return Config.model_validate(report.get("config"))
     except ValidationError as error:
         raise CorruptError("holds no config of this version", file=str(path), remedy="run again") from error
-
-
-def _up_of(report: dict[str, Any], config: Config) -> tuple[float, float, float]:
-    """The direction against gravity that the run took, by its config or else by its model's extension."""
-    from weathercoat.mesh.read import UP_OF_FORMAT
-
-    up: str | tuple[float, float, float] = config.model.up
-    if up == "auto":
-        model = next(iter(report.get("inputs", ())), "")
-        up = UP_OF_FORMAT.get(Path(model).suffix.lower().lstrip("."), "z")
-    if isinstance(up, str):
-        sign = -1.0 if up.startswith("-") else 1.0
-        x, y, z = (sign * (up[-1] == axis) for axis in "xyz")
-    else:
-        x, y, z = (part / math.hypot(*up) for part in up)
-    return x, y, z

@@ -33,10 +33,10 @@ class Surface:
 
     vertices: float64 (n, 3); faces: int32 (m, 3), counter-clockwise seen from outside. face_group: int32
     (m,), for each face an index into `groups`, the names of material groups or objects. uv: float64 (m, 3,
-    2), a texture coordinate per corner of a face (seams need no duplicate vertices), or None. colors: float64
-    (n, 4), the input's vertex colours (RGBA, 0 to 1), or None. up: unit vector (3,) against gravity, in the
-    model's axes. notes: repairs that were made and what could not be kept. place: where each vertex lies on
-    the input surface; None for the input itself.
+    2), a texture coordinate per corner of a face, v upwards (seams need no duplicate vertices), or None.
+    colors: float64 (n, 4), the input's vertex colours (RGBA, 0 to 1), or None. up: unit vector (3,) against
+    gravity, in the model's axes. notes: repairs that were made and what could not be kept. place: where each
+    vertex lies on the input surface; None for the input itself.
     """
 
     vertices: Vectors
@@ -65,7 +65,9 @@ class Surface:
 
     def diagonal(self) -> float:
         """Diagonal of the bounding box of the vertices in use."""
-        used = self.vertices[np.unique(self.faces)]
+        is_used = np.zeros(len(self.vertices), np.bool_)
+        is_used[self.faces] = True
+        used = self.vertices[is_used]
         return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
 
     def with_notes(self, *notes: Note) -> Surface:

@@ -137,6 +137,7 @@ def measure_surface(surface: Surface) -> dict[str, Any]:
         },
         "smallest_angle": {"median": float(np.median(smallest)), "worst": float(smallest.min())},
         "groups": [name for i, name in enumerate(surface.groups) if np.any(surface.face_group == i)],
+        "up": [float(part) for part in surface.up],
     }
 
 

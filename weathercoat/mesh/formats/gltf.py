@@ -204,7 +204,9 @@ class _Document:
             parts.triangles.append(triangles[:, [0, 2, 1]] if mirrored else triangles)
             parts.names.append(self._name(primitive, mesh, node))
             parts.nodes.append(number)
-            parts.uv.append(self._attribute(attributes, "TEXCOORD_0", len(local), ("VEC2",)))
+            uv = self._attribute(attributes, "TEXCOORD_0", len(local), ("VEC2",))
+            # glTF counts v from the top of the image, a Surface from the bottom, as OBJ does
+            parts.uv.append(None if uv is None else np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1))
             colors = self._attribute(attributes, "COLOR_0", len(local), ("VEC3", "VEC4"))
             parts.colors.append(None if colors is None else _encode_srgb(colors))
 
