@@ -41,6 +41,8 @@ _MOST_SHUFFLES = (
 )
 _SPRING = 0.5  # weight of springs against the mean of the neighbours
 _REGULARITY = 0.5  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
+_FINAL_ROUNDS = 2  # of the correction of the number of faces
+_LONGEST = 1.7  # of the target length, for edges that this correction makes
 _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the short crease beside them
 _SHORT_CREASE = 6.0  # target lengths; longer creases are kept in any case
 
@@ -174,7 +176,7 @@ def _iterate(
             _release_poor_creases(mesh, features, edge_length)
         if parameters.iterations // 2 <= number and (parameters.iterations - number) % 2 == 0:
             balance_directions(mesh, features, source.normals, parts, edge_length, _REGULARITY, random)
-    return mesh
+    return _meet_count(mesh, features, source, length, edge_length, parameters.faces)
 
 
 def _shuffle(
@@ -217,6 +219,34 @@ def _collapse(
     )
     collapse_pass(chosen, _COLLAPSE * length, _SPLIT * length, mesh, features, source.normals)
     return compact(mesh)
+
+
+def _meet_count(
+    mesh: EditableMesh,
+    features: Features,
+    source: InputSurface,
+    length: float,
+    edge_length: float,
+    faces: int,
+) -> EditableMesh:
+    """Collapse the shortest edges or split the longest ones until about the wanted number of faces is met."""
+    for _ in range(_FINAL_ROUNDS):
+        surplus = (int(mesh.count[1]) - faces) // 2
+        lengths = edge_lengths(mesh)
+        inner = np.flatnonzero((lengths >= 0) & (mesh.crease[: len(lengths)] < 0)).astype(np.int32)
+        by_length = inner[np.argsort(lengths[inner], kind="stable")]
+        if surplus > 0:
+            chosen = by_length[:surplus]
+            collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
+            mesh = compact(mesh)
+        elif surplus < 0:
+            chosen = by_length[surplus:]
+            mesh = reserve(mesh, len(chosen))
+            split_pass(chosen, np.full(len(chosen), 0.5), 0.0, 0.0, mesh, features)
+        for _ in range(2):
+            flip_edges(mesh, source.normals, 5, _REGULARITY)
+            _relax(mesh, features, source, edge_length)
+    return mesh
 
 
 def _relax(mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float) -> None:
