@@ -1,0 +1,49 @@
+"""Makes the generated pages and every picture of the documentation anew: all of them, or some by name.
+
+    python docs/make.py                     all of it
+    python docs/make.py pages               configuration.md, errors.md and gallery.md
+    python docs/make.py effects             the effect of each parameter, images/parameters
+    python docs/make.py effects --key curl.radius
+    python docs/make.py comparison          the default beside the paper's literal rules
+    python docs/make.py gallery             every shipped config on five parts, images/gallery
+    python docs/make.py first               the picture of the README
+
+The pictures come from the tool as it is shipped and from generated parts, so anyone can make them again.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from making import effects, gallery, pages
+
+PARTS = ("pages", "effects", "comparison", "gallery", "first")
+
+
+def main() -> None:
+    """Make what is asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS) + "; all by default")
+    parser.add_argument("--key", action="append", help="effects: only this parameter; may be given again")
+    parser.add_argument("--config", action="append", help="gallery: only this config; may be given again")
+    wanted = parser.parse_args()
+    parts = wanted.parts or PARTS
+    for part in parts:
+        if part not in PARTS:
+            parser.error(f"no part {part!r}; there are {', '.join(PARTS)}")
+    if "pages" in parts:
+        pages.write_pages()
+    if "effects" in parts:
+        effects.draw_effects(wanted.key)
+    if "comparison" in parts:
+        gallery.draw_comparison()
+    if "gallery" in parts:
+        gallery.draw_gallery(wanted.config)
+    if "first" in parts:
+        gallery.draw_first()
+
+
+if __name__ == "__main__":
+    main()

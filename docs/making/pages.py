@@ -1,0 +1,217 @@
+"""The pages that are generated: every key of the config, every code of a message, and the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from making import effects, gallery
+from making.places import DOCS, IMAGES
+from weathercoat import errors
+from weathercoat.config.describe import reference_markdown
+from weathercoat.config.presets import preset_names, preset_path, preset_purpose
+from weathercoat.config.schema import parameters
+
+_ABOUT_PICTURES = f"""\
+This page is made by `make docs`: the tables from the schema, the pictures by ageing a plate or a bracket of
+{effects.FACES:,} faces in {effects.STEPS} steps, up to a share of {effects.SHARE:g} of the run unless said \
+otherwise. They begin from the config
+`standard` and change one value, and what must be set for it to matter.
+
+See also [the method](method.md) for what the parameters do, and the [gallery](gallery.md) for what they make
+together.
+"""
+
+_ABOUT_ERRORS = """\
+# Exit codes and messages
+
+This page is made by `make docs`. The codes are stable: scripts may rely on them.
+
+A message is one line on standard error, `weathercoat: FILE: CODE: what; what to do`, and one for each
+problem of a config, `weathercoat: FILE:LINE: E-CONFIG: key: what`. With `--json` an error is an object under
+`"error"` with the keys `code`, `exit_code`, `file`, `message` and `remedy`. Notes (`W-...`) carry the
+number of elements that they concern and do not change the exit code; `run.json` lists them too. `--strict`
+makes the first one an error.
+"""
+
+_ABOUT_GALLERY = """\
+# Gallery
+
+Every shipped config on generated parts, intact and at the ages 0.2, 0.4, 0.6, 0.8 and 1. The parts come from
+`weathercoat sample`, and the pictures are the `preview.png` that a run writes. To make one of them:
+
+```console
+$ weathercoat sample barrel -o barrel.obj
+$ weathercoat run rusting barrel.obj -o barrel --set 'snapshots.steps=[0, 200, 400, 600, 800, 1000]'
+```
+
+`python docs/make.py gallery` makes all of them. For `literal` beside `standard` see
+[the method](method.md#the-literal-rules-and-the-default-side-by-side).
+"""
+
+_EXIT_CODES = {
+    0: "done; what was repaired is listed as `W-...`",
+    2: "the command line or the config is not valid",
+    3: "the model cannot be read",
+    4: "the model holds no usable surface, or needed a repair under `--strict`",
+    5: "over a limit of size, faces or memory",
+    6: "the tool's own result failed its checks; nothing was written",
+    7: "the output cannot be written, or exists",
+    70: "internal error: please report it",
+    130: "interrupted (Ctrl-C); nothing half-written is left",
+    141: "whoever read the standard output went away, as `head` does",
+    143: "terminated; nothing half-written is left",
+}
+
+# Code, what it says, what to do about it. A test compares the codes with those in the sources.
+WARNINGS = {
+    "W-ANIMATION": (
+        "The file has animations, which are not kept.",
+        "Nothing; export the wanted pose if it matters.",
+    ),
+    "W-BADINDEX": (
+        "Faces with an index that the format does not allow (0 in OBJ, negative in PLY) were dropped.",
+        "Export again if parts are missing.",
+    ),
+    "W-BOUNDARY": (
+        "The surface has open edges. Film ends there: a boundary never cracks, and counts as broken.",
+        "Nothing for sheets; close the holes of what should be solid.",
+    ),
+    "W-COMPONENTS": ("The model has several pieces that are not connected.", "Nothing; all of them age."),
+    "W-DEGENERATE": ("Faces without an area were removed.", "Nothing."),
+    "W-DUPLICATE": ("Faces on the same vertices as another were dropped.", "Nothing."),
+    "W-FACES": (
+        "The remeshed surface missed the wanted number of faces by over 2 %.",
+        "Ask for more faces, or raise `remesh.crease_angle`: many creases or pieces need many faces.",
+    ),
+    "W-FLIPPED": ("Faces that looked the other way than their neighbours were turned.", "Nothing."),
+    "W-FORMAT": (
+        "The content is of another format than the extension says; the content decided.",
+        "Rename the file.",
+    ),
+    "W-INVERTED": ("Closed pieces that were inside out were turned.", "Nothing."),
+    "W-MATERIAL": (
+        "A material library or a picture is not beside the model.",
+        "Put it there if `paint.only` or `paint.except` need the names of materials.",
+    ),
+    "W-MORPH": ("The file has morph targets, which are not kept.", "Export the wanted shape."),
+    "W-NONFINITE": (
+        "Vertices with infinite or undefined positions were dropped with their faces.",
+        "Export again.",
+    ),
+    "W-NONMANIFOLD": ("Edges of more than two faces were split, so that the film is a sheet.", "Nothing."),
+    "W-NONMANIFOLD-VERTEX": ("Vertices where pieces only touch were split.", "Nothing."),
+    "W-NONORIENTABLE": (
+        "A piece has only one side, as a Möbius strip has, and was cut open along some edges.",
+        "Nothing, unless the cut shows.",
+    ),
+    "W-POLYGONS": ("Polygons with more than three corners were triangulated.", "Nothing."),
+    "W-SELFINT": ("Faces cut through others; looked for by `inspect --self-intersections` only.", "Nothing."),
+    "W-SKIN": (
+        "A skinned mesh was read as it is modelled, without its pose.",
+        "Export the pose as a plain mesh.",
+    ),
+    "W-SOUP": (
+        "Most faces share no edge with another, so that the film cannot hang together.",
+        "Merge vertices in a modelling program.",
+    ),
+    "W-UNREFERENCED": ("Vertices that no face uses were dropped.", "Nothing."),
+    "W-WELDED": ("Vertices at the same position were merged.", "Nothing."),
+}
+
+
+def configuration_page() -> str:
+    """The reference of all keys, each section followed by the pictures of its parameters."""
+    first, *sections = reference_markdown().split("\n## ")
+    parts = [first.rstrip() + "\n\n" + _ABOUT_PICTURES.rstrip()]
+    for section in sections:
+        heading = section.partition("\n")[0].strip("`")
+        prefix = "" if heading == "Top level" else f"{heading}."
+        parts.append("\n".join(["## " + section.rstrip(), *_effect_rows(prefix)]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _effect_rows(prefix: str) -> Iterator[str]:
+    """Pictures of the parameters of a section, by the prefix of their keys, and why the others have none."""
+    keys = [p.key for p in parameters() if p.key.rpartition(".")[0] == prefix.rstrip(".")]
+    shown = [key for key in keys if key in effects.EFFECTS]
+    if shown:
+        yield "\n| key | from left to right | |\n|---|---|---|"
+    for key in shown:
+        effect = effects.EFFECTS[key]
+        notes = []
+        if effect.also:
+            notes.append("with " + ", ".join(f"`{setting}`" for setting in effect.also))
+        if effect.share != effects.SHARE:
+            notes.append(f"at a share of {effect.share:g}")
+        values = ", ".join(f"`{value}`" for value in effect.values)
+        link = _link(effects.FOLDER, effects.picture_name(key))
+        yield f"| `{key}` | {'; '.join([values, *notes])} | ![{key}: {values.replace('`', '')}]({link}) |"
+    without = [f"`{key}` ({effects.WITHOUT_PICTURE[key]})" for key in keys if key in effects.WITHOUT_PICTURE]
+    if without:
+        yield "\nWithout a picture: " + ", ".join(without) + "."
+
+
+def errors_page() -> str:
+    """Exit codes, errors and warnings, each with its remedy."""
+    lines = [_ABOUT_ERRORS, "## Exit codes", "", "| exit | meaning |", "|---|---|"]
+    lines += [f"| {code} | {meaning} |" for code, meaning in _EXIT_CODES.items()]
+    lines += ["", "## Errors", "", "| code | exit | what it means | what to do |", "|---|---|---|---|"]
+    lines += [f"| `{e.code}` | {e.exit_code} | {_summary(e)} | {e.remedy} |" for e in coded_errors()]
+    lines += ["", "The message itself is often more particular than this table.", ""]
+    lines += ["## Notes", "", "| code | what it means | what to do |", "|---|---|---|"]
+    lines += [f"| `{code}` | {what} | {remedy} |" for code, (what, remedy) in sorted(WARNINGS.items())]
+    return "\n".join(lines) + "\n"
+
+
+def coded_errors() -> list[type[errors.WeathercoatError]]:
+    """Every class of error with a code of its own, by exit code, in the order of the source."""
+    classes = [value for value in vars(errors).values() if isinstance(value, type)]
+    own = [c for c in classes if issubclass(c, errors.WeathercoatError) and "code" in vars(c)]
+    return sorted(own, key=lambda error: error.exit_code)
+
+
+def _summary(error: type[errors.WeathercoatError]) -> str:
+    if error is errors.WeathercoatError:
+        return "A fault of the tool."
+    return " ".join((error.__doc__ or "").partition("\n\n")[0].split())
+
+
+def gallery_page() -> str:
+    """Every shipped config on every part, with the command that makes the picture."""
+    lines = [_ABOUT_GALLERY.rstrip()]
+    for name in preset_names():
+        lines += ["", f"## {name}", "", f"{_about(name)}", ""]
+        lines += [f"[`configs/{name}.yaml`](../configs/{name}.yaml)", ""]
+        for part in gallery.PARTS:
+            link = _link(gallery.FOLDER, gallery.picture_name(name, part))
+            lines += [f"![{preset_purpose(name)}, on a {part}]({link})", ""]
+        lines.pop()
+    return "\n".join(lines) + "\n"
+
+
+def _about(name: str) -> str:
+    """The comment that heads a shipped config."""
+    comment = []
+    for line in preset_path(name).read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            break
+        comment.append(line.lstrip("# "))
+    return " ".join(comment)
+
+
+def _link(folder: object, name: str) -> str:
+    return f"images/{str(folder).removeprefix(str(IMAGES))[1:]}/{name}"
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "configuration.md": configuration_page,
+    "errors.md": errors_page,
+    "gallery.md": gallery_page,
+}
+
+
+def write_pages() -> None:
+    """Write the generated pages."""
+    for name, make in PAGES.items():
+        (DOCS / name).write_text(make(), encoding="utf-8")
+        print(name, flush=True)
