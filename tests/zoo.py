@@ -1,6 +1,7 @@
 """A zoo of small meshes whose every vertex and edge a test can name.
 
-All lie in the plane z = 0 with their outside towards +z unless said otherwise, and have edges of about unit length.
+All lie in the plane z = 0 with their outside towards +z unless said otherwise, and have edges of about unit
+length.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ def make_triangle() -> Surface:
 
 
 def make_hinge(bend: float = 0.0) -> Surface:
-    """Two equilateral faces on the edge 0-1, corners as drawn in `mesh.dihedral` (2 is p3, 3 is p4), bent by `bend`.
+    """Two equilateral faces on the edge 0-1, corners as drawn in `mesh.dihedral` (2 is p3, 3 is p4), bent by
+    `bend`.
 
     The face with p4 is turned about the edge: down, away from the outside, for a positive bend.
     """
@@ -69,13 +71,14 @@ def make_hexagon(rings: int = 2) -> Surface:
 
 
 def make_lattice(columns: int, rows: int) -> Surface:
-    """A parallelogram of the equilateral lattice; vertex j (columns + 1) + i is i along +x and j at 60 degrees to it."""
+    """A parallelogram of the lattice; vertex j (columns + 1) + i is i along +x, j at 60 degrees."""
     corner = [(i + 0.5 * j, HALF_ROOT_3 * j, 0.0) for j in range(rows + 1) for i in range(columns + 1)]
     return _surface(corner, _grid_faces(columns, rows))
 
 
 def make_ladder(rungs: int, *, length: float = 1.0, width: float = 1.0) -> Surface:
-    """A strip of `rungs` - 1 rectangles along +x, each cut by a diagonal; rung i has the vertices 2 i (y = 0), 2 i + 1.
+    """A strip of `rungs` - 1 rectangles along +x, each cut by a diagonal; rung i has the vertices 2 i (y =
+    0), 2 i + 1.
 
     All vertices are on the rim; the inner edges are the rungs and the diagonals from 2 i to 2 i + 3.
     """
@@ -105,7 +108,7 @@ def make_two_pieces() -> Surface:
 
 
 def make_roof(bend: float = 0.8, rows: int = 4) -> Surface:
-    """Two lattice planes that meet in a straight ridge of `rows` edges along y; a negative bend makes a valley."""
+    """Two lattice planes that meet in a straight ridge of `rows` edges along y; a valley where negative."""
     columns = np.array([-1.0, 0.0, 1.0])
     corner = [
         (x * np.cos(bend / 2), HALF_ROOT_3 * j, -abs(x) * np.sin(bend / 2))

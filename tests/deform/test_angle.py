@@ -1,4 +1,4 @@
-"""Angle constraints on single hinges: the formula, the conservation laws, and what each form can and cannot do."""
+"""Angle constraints on single hinges: the formula, conservation laws, and what each form can do."""
 
 from __future__ import annotations
 
@@ -74,7 +74,8 @@ def test_signed_forms_meet_any_target_from_any_fold(
 ) -> None:
     """A Newton iteration on a smooth angle ends in round-off: 1e-12 of angles of order one.
 
-    Halves of the split form need a neutral direction of their own, so there a single free apex converges too, linearly.
+    Halves of the split form need a neutral direction of their own, so there a single free apex converges too,
+    linearly.
     """
     points = zoo.make_hinge(start).vertices
     after = project(form, points, target, masses, times=200)
@@ -120,11 +121,12 @@ def test_a_face_of_no_area_stays(form: str, apex: int) -> None:
     free=st.integers(0, 3),
 )
 def test_no_correction_throws_a_point_far(form: str, points: Vectors, target: float, free: int) -> None:
-    """A single free point whose leverage may vanish: an error of at most 1 rad over at least 0.05 of both apexes'.
+    """A single free point whose leverage may vanish: at most 1 rad over at least 0.05 of both apexes'.
 
-    With heights h and gradients 1 / h of the apexes, and those of an edge's end at most a lever times them, the move is
-    below 1 lever (1/h3 + 1/h4) / (0.05 (1/h3^2 + 1/h4^2)), hence 40 levers of the lower height. The split form moves
-    an end of the edge twice, the second time with the lever that the first left: twice that.
+    With heights h and gradients 1 / h of the apexes, and those of an edge's end at most a lever times them,
+    the move is below 1 lever (1/h3 + 1/h4) / (0.05 (1/h3^2 + 1/h4^2)), hence 40 levers of the lower height.
+    The split form moves an end of the edge twice, the second time with the lever that the first left: twice
+    that.
     """
     masses = np.zeros(4)
     masses[free] = 1.0
@@ -175,7 +177,7 @@ def test_the_split_form_converges_where_the_faces_differ_in_height(height: float
 
 @pytest.mark.parametrize("target", [-1.2, 1.2])
 def test_the_split_form_turns_each_face_to_half_the_outer_dihedral(target: float) -> None:
-    """Paper 4.3, with the edge held: each face makes phi_0 / 2 with the neutral direction, here +z by symmetry."""
+    """Paper 4.3, with the edge held: each face makes phi_0 / 2 with the neutral direction, here +z."""
     after = project("split", zoo.make_hinge(0.0).vertices, target, CLAMPED, times=100)
     for apex in (2, 3):
         way = after[apex] - (0.5, 0, 0)

@@ -8,7 +8,7 @@ from weathercoat.deform.substrate import lift_to_substrate
 
 
 def test_only_what_is_below_moves_and_only_along_the_normal() -> None:
-    """Three film vertices of two origins; the second origin's plane is tilted by 45 degrees through (1, 0, 0)."""
+    """Film vertices of two origins; the second one's plane is tilted by 45 degrees through (1, 0, 0)."""
     tilted = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
     rest_positions = np.array([(0, 0, 0), (1, 0, 0)], float)
     rest_normals = np.array([(0, 0, 1), tilted])

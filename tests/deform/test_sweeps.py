@@ -78,7 +78,7 @@ def test_an_attached_film_has_no_constraint() -> None:
 
 
 def test_a_released_vertex_holds_its_edges_and_bends_the_opposite_ones() -> None:
-    """Paper 5.1: angle constraints on the edges opposite to it, length constraints on those incident to it."""
+    """Paper 5.1: angles on the edges opposite to it, lengths on those incident to it."""
     surface = zoo.make_hexagon(2)
     mesh, constraints = released(surface, [0])
     ring = range(1, 7)
@@ -119,7 +119,7 @@ def test_a_new_constraint_starts_at_the_present_bend() -> None:
 
 
 def test_a_broken_edge_loses_its_angle_and_has_two_lengths() -> None:
-    """Paper 5.2: the length constraint is doubled, one for each half-edge, and nothing refers across the crack."""
+    """Paper 5.2: the length is doubled, one for each half-edge, and nothing refers across the crack."""
     surface = zoo.make_hexagon(2)
     mesh, constraints = released(surface, list(range(19)))
     lengths, angles = len(constraints.length_ends), len(constraints.hinges)
@@ -175,7 +175,7 @@ def test_every_live_edge_of_a_free_film_is_constrained_once() -> None:
 
 
 def test_curvature_targets_are_those_of_the_closed_form() -> None:
-    """start - (1 - exp(-rate t)) h / radius, with h the distance of the faces' centres: 2/3 of a height here."""
+    """start - (1 - exp(-rate t)) h / radius, with h the distance of the faces' centres."""
     _, constraints = released(zoo.make_hinge(0.2), [2, 3], age=0.25)
     centres = zoo.make_hinge(0.2).vertices[zoo.make_hinge().faces].mean(axis=1)
     span = np.linalg.norm(centres[0] - centres[1])
@@ -210,7 +210,7 @@ def test_tight_curls_stop_short_of_folding_through() -> None:
 
 
 def test_a_flap_curls_to_its_target_and_keeps_its_lengths() -> None:
-    """One free apex of a flat hinge, three constraints: all met to round-off, the attached corners untouched."""
+    """One free apex of a flat hinge, three constraints: met to round-off, the attached corners untouched."""
     mesh, constraints = released(zoo.make_hinge(), [2])
     deform(mesh, constraints, parameters(deformation_sweeps=200, curl_rate=50.0), 1.0)
     bends = np.empty(len(mesh.twin))
@@ -250,8 +250,8 @@ def curl_clamped(mesh: HalfEdgeMesh, lengths: Vectors, bends: Vectors, free: lis
 def test_a_clamped_strip_curls_to_a_prism() -> None:
     """Four squares, the first clamped; each rung bends by -0.4, the diagonals stay flat.
 
-    Isometric, so the solution is exact: rung i lies at the sum of unit steps at the angles 0, 0.4, 0.8, 1.2. Sweeps
-    converge linearly; 3,000 of them on 12 free coordinates end in round-off.
+    Isometric, so the solution is exact: rung i lies at the sum of unit steps at the angles 0, 0.4, 0.8, 1.2.
+    Sweeps converge linearly; 3,000 of them on 12 free coordinates end in round-off.
     """
     mesh = make_mesh(zoo.make_ladder(5))
     bends = np.zeros(len(mesh.twin))
@@ -269,8 +269,8 @@ def test_a_clamped_strip_curls_to_a_prism() -> None:
 def test_a_clamped_sheet_curls_to_a_cylinder() -> None:
     """Targets of an oblique lattice on a cylinder of radius 2: lengths and signed bends, some of them ridges.
 
-    The first two columns are clamped on the cylinder; the others start on the flat sheet. The exact positions are those
-    of the map (x, y) -> (R sin(x / R), y, R - R cos(x / R)).
+    The first two columns are clamped on the cylinder; the others start on the flat sheet. The exact positions
+    are those of the map (x, y) -> (R sin(x / R), y, R - R cos(x / R)).
     """
     surface = zoo.make_lattice(4, 2)
     radius = 2.0
@@ -291,7 +291,7 @@ def test_a_clamped_sheet_curls_to_a_cylinder() -> None:
 
 @pytest.mark.parametrize("form", ["dihedral", "split", "arccos"])
 def test_attached_vertices_never_move_and_none_goes_below_the_metal(form: str) -> None:
-    """On a sphere with every third vertex attached: attached ones bit for bit, others above their tangent planes."""
+    """A sphere with every third vertex attached: those bit for bit, others above their tangent planes."""
     surface = make_sphere(subdivisions=2)
     free = [v for v in range(len(surface.vertices)) if v % 3]
     mesh, constraints = released(surface, free)

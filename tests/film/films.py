@@ -21,7 +21,7 @@ from weathercoat.film.state import (
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, check_half_edges, make_event_log
 from weathercoat.mesh.surface import Indices, Surface, Vectors
 
-# A film of tension 1 for ever that no defect or scatter disturbs, under the paper's literal rules of fracture.
+# A film of tension 1 for ever that no defect or scatter disturbs, under the paper's literal rules.
 STEADY = {
     "tension_law": "saturating",
     "tension_initial": 1.0,

@@ -1,7 +1,7 @@
 """Fracture on hand-made meshes where every break can be predicted.
 
-Unless said otherwise the tension is 1 in every face, so an inner edge bears 2 and breaks where its cohesion, times beta
-where a tip leads on along it, is below 2.
+Unless said otherwise the tension is 1 in every face, so an inner edge bears 2 and breaks where its cohesion,
+times beta where a tip leads on along it, is below 2.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def test_an_edge_between_two_rims_leaves_two_pieces() -> None:
 
 
 def test_a_crack_that_meets_another_one_ends_there() -> None:
-    """A junction: the flank of a crack along x is hit from above; the vertex there has three fans, none a tip."""
+    """A junction: the flank of a crack along x is hit from above; three fans there, none a tip."""
     film = make_film(HEXAGON)
     film.set_cohesion(1.0, along(-1, 0), along(0, 1))
     film.fracture()
@@ -254,7 +254,7 @@ def test_two_tips_that_face_each_other_weaken_once(bond: float, breaks: bool) ->
 
 
 def test_of_three_ways_on_the_tip_takes_one() -> None:
-    """At alpha = 0.45 three edges lead on, all with the same overload: the hash decides, and the tip is used up."""
+    """At alpha = 0.45 three edges lead on, all with the same overload: the hash decides."""
     film = make_film(HEXAGON, cohesion_base=9.0, fracture_direction_threshold=0.45)
     film.set_cohesion(1.0, along(0, 1))
     film.fracture()
@@ -389,7 +389,8 @@ def test_fraying_goes_on_from_the_first_break() -> None:
 def test_a_frayed_edge_breaks_when_its_closed_form_says_so() -> None:
     """C exp(-2 (t - 0.1)) falls below the pull: its two faces keep 0.5 and 1, in sum 1.5.
 
-    5 exp(-2 (t - 0.1)) = 1.5 at t = 0.1 + ln(5 / 1.5) / 2 = 0.702; four edges fray, and the first breaks then.
+    5 exp(-2 (t - 0.1)) = 1.5 at t = 0.1 + ln(5 / 1.5) / 2 = 0.702; four edges fray, and the first breaks
+    then.
     """
     due = 0.1 + math.log(5 / 1.5) / 2
     film = make_film(HEXAGON, cohesion_base=5.0, cohesion_decay_rate=2.0, fracture_direction_factor=1.0)
@@ -429,10 +430,11 @@ def distance_to_segment(point: Vectors, a: Vectors, b: Vectors) -> float:
 def unloaded_caps(
     film: Film, broken: Edge, tips: tuple[int, ...], lag: float, alpha: float, caps: Vectors | None = None
 ) -> Vectors:
-    """What the break of an edge leaves of `caps` (m,), 1 by default: 1 - exp(-r / lag) where it reaches; a plain flood.
+    """What the break of an edge leaves of `caps` (m,), 1 by default: 1 - exp(-r / lag) where it reaches; a
+    plain flood.
 
-    It floods from each of the edge's two faces over twins, within 3 lags, not into what lies ahead of a tip, and not
-    across faces that are as relaxed already.
+    It floods from each of the edge's two faces over twins, within 3 lags, not into what lies ahead of a tip,
+    and not across faces that are as relaxed already.
     """
     mesh = film.mesh
     rest = mesh.rest_positions

@@ -25,7 +25,7 @@ def attached_film(surface: Surface, **changes: object) -> Film:
 
 
 def test_flat_sum_is_half_the_tension_for_each_opposite_half_edge() -> None:
-    """At phi = pi the sigmoid is 1/2. Opposite to the centre of a disc lie six rims, to a rim vertex two spokes."""
+    """At phi = pi the sigmoid is 1/2. Opposite to a disc's centre lie six rims, to a rim vertex two."""
     lift = lift_of(attached_film(zoo.make_disc(6)), 0.7)
     np.testing.assert_allclose(lift, [6 * 0.7 / 2] + [2 * 0.7 / 2] * 6, rtol=1e-14)
 
@@ -48,7 +48,7 @@ def test_valence_matters_only_to_the_plain_sum(spokes: int) -> None:
 @pytest.mark.parametrize("bend", [-2.5, -0.8, -0.01, 0.0, 0.01, 0.8, 2.5])
 @pytest.mark.parametrize("convexity", [0.0, 2.0, 7.0])
 def test_sigmoid_of_the_dihedral(bend: float, convexity: float) -> None:
-    """F = T / (1 + exp(-a (phi - pi))), at a hinge whose corners 2 and 3 each have one opposite half-edge inside."""
+    """F = T / (1 + exp(-a (phi - pi))), at a hinge: corners 2 and 3 have one half-edge opposite."""
     film = attached_film(zoo.make_hinge(bend), lift_convexity=convexity)
     expected = 0.7 / (1 + np.exp(-convexity * bend))
     lift = lift_of(film, 0.7)

@@ -20,8 +20,8 @@ from weathercoat.film.noise import (
 
 coordinates = st.floats(-300, 300, allow_nan=False)
 
-# The twelve directions from the centre of a cube to its edges, in the order in which the reference's bit tricks pick
-# them for hash & 15; the last four repeat.
+# The twelve directions from the centre of a cube to its edges, in the order in which the reference's bit
+# tricks pick them for hash & 15; the last four repeat.
 DIRECTIONS = [
     (1, 1, 0), (-1, 1, 0), (1, -1, 0), (-1, -1, 0),
     (1, 0, 1), (-1, 0, 1), (1, 0, -1), (-1, 0, -1),
@@ -31,7 +31,7 @@ DIRECTIONS = [
 
 
 def reference_noise(x: float, y: float, z: float) -> float:
-    """Improved noise in plain words: the dot products at the eight corners, faded into one another axis by axis."""
+    """Improved noise in plain words: the dot products at the eight corners, faded axis by axis."""
     p = [int(value) for value in PERMUTATION] * 2
     floor = [math.floor(c) for c in (x, y, z)]
     cell = [f % 256 for f in floor]
@@ -64,7 +64,7 @@ def test_permutation_is_one() -> None:
 
 
 def test_published_value() -> None:
-    """The value that the reference implementation prints for this point; sums of eight terms round at 1e-16."""
+    """The value that the reference implementation prints here; sums of eight terms round at 1e-16."""
     assert noise(3.14, 42, 7) == pytest.approx(0.13691995878400012, abs=1e-15)
 
 
@@ -83,7 +83,7 @@ def test_is_zero_on_the_lattice_and_repeats_after_256() -> None:
 
 
 def test_is_smooth_across_cells() -> None:
-    """The fade has no first and second derivative at the lattice, so values 1e-4 to both sides are on one line."""
+    """The fade has no first and second derivative at the lattice, so values 1e-4 away lie on a line."""
     for y in (0.3, 7.6):
         left, middle, right = (noise(12 + d, y, 0.4) for d in (-1e-4, 0.0, 1e-4))
         assert left + right - 2 * middle == pytest.approx(0.0, abs=1e-9)
@@ -114,7 +114,7 @@ def test_fractal_noise_has_the_wavelength_it_is_given() -> None:
 
 
 def test_hash_is_uniform() -> None:
-    """20,000 numbers: the mean errs by 0.002 (one sigma), each of 20 bins by 31 of 1,000; bounds at 4.5 sigma."""
+    """20,000 numbers: the mean errs by 0.002 (one sigma), a bin of 1,000 by 31; bounds at 4.5 sigma."""
     numbers = hash_uniform(points_of(20_000), stream_key(1, "cohesion"))
     assert numbers.min() >= 0.0 and numbers.max() < 1.0
     assert abs(numbers.mean() - 0.5) < 4.5 * np.sqrt(1 / 12 / 20_000)
@@ -156,7 +156,7 @@ def test_a_number_belongs_to_its_place() -> None:
 
 @pytest.mark.parametrize("cells", [3, 10, 64, 128, 1000])
 def test_last_bits_on_a_grid_do_not_matter(cells: int) -> None:
-    """Midpoints of a grid lie at multiples of half a quantum when it has 64 cells, where rounding would decide."""
+    """Midpoints of a grid lie at multiples of half a quantum of 64 cells: rounding would decide."""
     line = np.arange(2 * cells + 1) / (2 * cells) - 0.5
     points = np.stack([line, line[::-1], np.zeros_like(line)], axis=1)
     key = stream_key(1, "cohesion")

@@ -42,7 +42,7 @@ def first_steps(film: Film) -> dict[int, int]:
 @pytest.mark.parametrize("law", ["saturating", "linear"])
 @pytest.mark.parametrize("base", [0.5, 0.8])
 def test_a_flat_film_separates_at_the_predicted_step(rule: str, law: str, base: float) -> None:
-    """All at once, in the first step with k 3 T(t) > A (1 - d t): six half-edges, each lifting half of k T."""
+    """All in the first step with k 3 T(t) > A (1 - d t): six half-edges, each lifting half of k T."""
     film = attached_film(
         zoo.make_hexagon(2), tension_law=law, adhesion_base=base, lift_sum="per_valence", **DRYING
     )
@@ -55,7 +55,7 @@ def test_a_flat_film_separates_at_the_predicted_step(rule: str, law: str, base: 
 
 
 def test_the_plain_sum_lets_rims_go_later() -> None:
-    """Literally the corners of a hexagon (two or three half-edges opposite) lift less than its inside (six)."""
+    """Literally the corners of a hexagon (two or three half-edges opposite) lift less than the inside."""
     surface = zoo.make_hexagon(2)
     film = attached_film(surface, adhesion_base=0.5, lift_sum="plain", **DRYING)
     opposite = np.bincount(surface.faces.reshape(-1))
@@ -126,8 +126,8 @@ def test_vertices_without_a_face_do_not_separate() -> None:
 def test_finds_whom_a_plain_evaluation_finds_while_the_film_moves(rule: str, sums: str) -> None:
     """The lift that is kept for undisturbed vertices, against all lifts summed anew in every step."""
     film = attached_film(
-        make_sphere(subdivisions=2), tension_initial=0.0, tension_rate=3.0, lift_coefficient=0.3, lift_sum=sums,
-        lift_tension=rule, adhesion_amplitude=0.5, adhesion_decay_rate=0.5, cohesion_base=1.2,
+        make_sphere(subdivisions=2), tension_initial=0.0, tension_rate=3.0, lift_coefficient=0.3,
+        lift_sum=sums, lift_tension=rule, adhesion_amplitude=0.5, adhesion_decay_rate=0.5, cohesion_base=1.2,
     )  # fmt: skip
     random = np.random.default_rng(3)
     seen = 0

@@ -77,7 +77,7 @@ def test_defects_by_share_are_that_many_edges(share: float) -> None:
 
 
 def test_defects_by_area_do_not_hang_on_the_mesh() -> None:
-    """A unit sheet with 60 defects per unit area has 60, of 500 faces as of 4,000: within 4.5 sigma of Poisson."""
+    """A unit sheet with 60 defects per unit area has 60, of 500 faces as of 4,000, at 4.5 sigma."""
     for faces in (500, 4000):
         mesh = zoo.make_mesh(make_random_sheet(faces=faces))
         found = [
@@ -129,7 +129,8 @@ def test_an_intact_face_has_the_drying_tension(law: str) -> None:
 
 
 def test_adhesion_falls_by_a_rate_of_its_base_to_zero() -> None:
-    parameters = FilmParameters(**{**STEADY, "adhesion_base": 2.0, "adhesion_decay_rate": 0.5})  # type: ignore[arg-type]
+    changed = {**STEADY, "adhesion_base": 2.0, "adhesion_decay_rate": 0.5}
+    parameters = FilmParameters(**changed)  # type: ignore[arg-type]
     start = np.array([0.5, 2.0, 3.0])
     np.testing.assert_allclose(adhesion_at(start, parameters, 1.0), [0.0, 1.0, 2.0], atol=1e-15)
     assert (adhesion_at(start, parameters, 0.0) == start).all()

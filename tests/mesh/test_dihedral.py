@@ -11,7 +11,8 @@ from tests import zoo
 from weathercoat.mesh.dihedral import all_bends, bend_angle, bend_gradient, half_edge_bend
 from weathercoat.mesh.surface import Vectors
 
-# A fold's sine and cosine are formed from products of coordinates of order one: a few roundings of 2.2e-16 each.
+# A fold's sine and cosine are formed from products of coordinates of order one: a few roundings of 2.2e-16
+# each.
 ROUNDOFF = 1e-14
 
 
@@ -61,7 +62,7 @@ def test_flat_is_exactly_zero() -> None:
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9])
 def test_almost_closed_folds_keep_their_sign(sign: int, gap: float) -> None:
-    """Bends towards -pi and pi: outer dihedrals towards 0 and 2 pi; the gap is resolved to its own last digits."""
+    """Bends towards -pi and pi: outer dihedrals towards 0 and 2 pi; the gap is resolved."""
     p4 = (0.5, zoo.HALF_ROOT_3 * np.cos(gap), -sign * zoo.HALF_ROOT_3 * np.sin(gap))
     points = zoo.make_hinge().vertices.copy()
     points[3] = p4
@@ -121,7 +122,8 @@ def test_gradient_is_that_of_central_differences(points: Vectors) -> None:
 @settings(max_examples=100, deadline=None)
 @given(points=hinges)
 def test_gradient_knows_no_force_and_no_torque(points: Vectors) -> None:
-    """The bend does not change under translation (gradient sums to zero) and rotation (no torque about the origin).
+    """The bend does not change under translation (gradient sums to zero) and rotation (no torque about the
+    origin).
 
     Gradients of at most 1 / 0.2 per point, and arms of at most 2: sums of a dozen terms round at 1e-13.
     """
@@ -133,7 +135,7 @@ def test_gradient_knows_no_force_and_no_torque(points: Vectors) -> None:
 @settings(max_examples=60, deadline=None)
 @given(points=hinges, seed=st.integers(0, 10**6), scale=st.floats(1e-3, 1e3))
 def test_similarities_leave_the_bend(points: Vectors, seed: int, scale: float) -> None:
-    """Rotation, translation by up to 10, and scale; the moved coordinates carry errors of 1e-15, heights are 0.2."""
+    """Rotation, translation by up to 10, and scale; the moved coordinates carry errors of 1e-15."""
     bend = bend_of(points)
     assume(abs(bend) < np.pi - 1e-6)
     moved = (points @ random_rotation(seed).T + np.random.default_rng(seed).uniform(-10, 10, 3)) * scale

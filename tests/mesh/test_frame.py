@@ -55,7 +55,7 @@ def test_is_a_basis_with_up_last_and_goes_there_and_back(
 
 @pytest.mark.parametrize("seed", range(6))
 def test_local_coordinates_do_not_change_with_place_unit_and_turn(seed: int) -> None:
-    """Coordinates of a few sizes round at 1e-15; solving for the axes multiplies that by 1 / spread, about 10."""
+    """Coordinates of a few sizes round at 1e-15; the axes multiply that by 1 / spread, about 10."""
     random = np.random.default_rng(seed)
     expected = make_frame(BRACKET).localise(BRACKET.vertices)
     moved = turned(BRACKET, random_rotation(seed))
@@ -65,13 +65,14 @@ def test_local_coordinates_do_not_change_with_place_unit_and_turn(seed: int) -> 
 
 
 def test_first_axis_is_the_long_one_towards_the_heavier_tail() -> None:
-    """A lying wedge, wide at x = 0 and narrow at x = 3: the third moment about its centre is positive along x."""
+    """A lying wedge, wide at x = 0 and narrow at x = 3: its third moment is positive along x."""
     plate = shapes.make_plate(columns=12, rows=4)
     along, across = plate.vertices[:, 0] + 0.5, plate.vertices[:, 1] - 0.5
     for sign in (1, -1):
         wedge = np.stack([3 * along, np.zeros_like(along), across * (1 - 0.9 * along)], axis=1)
         surface = make_surface(wedge * (sign, 1, sign), plate.faces)
-        # the third moment decides the sign only; the axis is that of the second, which the diagonals tilt a little
+        # the third moment decides the sign only; the axis is that of the second, which the diagonals tilt a
+        # little
         assert make_frame(surface).axes[0] @ [sign, 0, 0] > 0.999
 
 

@@ -166,7 +166,7 @@ def test_centre_of_a_disc_has_one_vertex_for_each_cut_spoke(order: tuple[int, ..
 @settings(max_examples=40, deadline=None)
 @given(name=st.sampled_from(sorted(ZOO)), seed=st.integers(0, 2**32 - 1))
 def test_cutting_every_edge_in_any_order_leaves_single_triangles(name: str, seed: int) -> None:
-    """After each cut the structure is sound; after the last, each face has three vertices of its own: 3 m in all."""
+    """After each cut the structure is sound; after the last, each face has three vertices of its own."""
     surface = ZOO[name]()
     mesh, log = make_mesh(surface), make_event_log(len(surface.faces))
     inner = np.flatnonzero(mesh.twin > np.arange(len(mesh.twin)))

@@ -1,4 +1,6 @@
-"""Small runs for the tests of the whole simulation: parameters that fail quickly, and what must hold after every step."""
+"""Small runs for the tests of the whole simulation: parameters that fail quickly, and what must hold after
+every step.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from weathercoat.sim.simulation import Simulation, make_simulation
 from weathercoat.sim.snapshot import Snapshot
 from weathercoat.stain.rust import StainParameters
 
-# A brittle film that separates early, on meshes of a few hundred faces: about half of it fails within the run.
+# A brittle film that separates early, on meshes of a few hundred faces: about half of it fails within the
+# run.
 FILM = {
     "tension_law": "saturating",
     "tension_initial": 0.0,
@@ -152,7 +155,7 @@ def snapshot_bytes(snapshot: Snapshot) -> bytes:
 
 
 def failed_shares(simulation: Simulation) -> dict[str, float]:
-    """Shares of vertices of the metal that the film has let go, of area that has fallen, and of faces with a crack."""
+    """Shares of vertices of the metal that the film has let go, of fallen area, and of cracked faces."""
     lifted = np.isfinite(simulation.rust.lifted_age)
     frayed = np.isfinite(simulation.film.fray_age)
     return {

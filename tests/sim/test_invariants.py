@@ -26,7 +26,7 @@ SHAPES = {
 
 
 def roughened(surface: Surface, seed: int) -> Surface:
-    """The sheet with every vertex off by up to a third of an edge, in all directions: sharp folds and slivers."""
+    """The sheet with every vertex off by up to a third of an edge, any way: sharp folds and slivers."""
     reach = 0.3 * np.sqrt(surface.area() / len(surface.faces))
     error = np.random.default_rng(seed).uniform(-reach, reach, surface.vertices.shape)
     return make_surface(surface.vertices + error, surface.faces)
@@ -108,7 +108,7 @@ RULES = {
 @pytest.mark.parametrize("name", RULES)
 @pytest.mark.parametrize("shape", ["sheet", "bracket"])
 def test_every_rule_by_itself(name: str, shape: str) -> None:
-    """Each literal rule, on an open sheet and on a closed part with creases: sound, and the film does fail."""
+    """Each literal rule, on an open sheet and a closed part with creases: sound, and the film does fail."""
     film, curl = RULES[name]
     surface = (
         make_random_sheet(faces=250)
@@ -126,7 +126,7 @@ def test_every_rule_by_itself(name: str, shape: str) -> None:
 
 
 def test_the_film_ends_whole_where_it_is_strong() -> None:
-    """Nothing separates under an adhesion that no lift reaches: not a bit of the state changes but what ages."""
+    """Nothing separates under an adhesion that no lift reaches: nothing changes but what ages."""
     simulation = make_run(make_random_sheet(faces=120), film={"adhesion_base": 100.0}, steps=20)
     run_checked(simulation)
     assert failed_shares(simulation) == {"separated": 0.0, "lost": 0.0, "cracked": 0.0}

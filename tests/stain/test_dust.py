@@ -38,7 +38,8 @@ def test_a_slope_counts_by_its_normal() -> None:
 
 @pytest.mark.parametrize("bend", [-1.5, -0.5, 0.5, 1.5])
 def test_hollows_gather_more_than_ridges(bend: float) -> None:
-    """1 - phi / 2 pi with phi the mean outer dihedral at a vertex: the fold's edges have pi + bend, the others pi.
+    """1 - phi / 2 pi with phi the mean outer dihedral at a vertex: the fold's edges have pi + bend, the
+    others pi.
 
     An end of the hinge's edge starts two half-edges, of which one is the fold.
     """
@@ -50,7 +51,8 @@ def test_hollows_gather_more_than_ridges(bend: float) -> None:
 
 
 def test_a_closed_solid() -> None:
-    """An octahedron on its corner: the top is highest (0); the bottom looks down (0); the belt has half a height.
+    """An octahedron on its corner: the top is highest (0); the bottom looks down (0); the belt has half a
+    height.
 
     There the normal is level (1/2) and the bend is pi - arccos(-1/3) on all edges.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -133,7 +134,7 @@ def run(
     steps: int,
     parameters: StainParameters = STAIN,
 ) -> Vectors:
-    """Runoff rust of the vertices after an age in a number of steps, from sources that are there from the start."""
+    """Runoff rust of the vertices after an age in a number of steps, from sources that are there at once."""
     mesh = make_mesh(surface)
     rust = make_rust_state(mesh)
     rust.source[sources] = True
@@ -156,7 +157,8 @@ def test_a_source_grows_to_its_cap_by_the_closed_form(steps: int) -> None:
 
 
 def test_a_streak_fades_over_its_length() -> None:
-    """In the steady state a vertex has exp(-s / length) of the source s above it, as long as more than a tenth comes.
+    """In the steady state a vertex has exp(-s / length) of the source s above it, as long as more than a
+    tenth comes.
 
     Rates of 3 and 4 / 0.5 over an age of 20 leave exp(-60) and less of the way.
     """
@@ -185,7 +187,7 @@ def test_level_surfaces_hold_their_rust() -> None:
 
 @pytest.mark.parametrize("speed", [1.0, 2.0])
 def test_a_streak_has_a_speed(speed: float) -> None:
-    """Twice the speed of run-off and of the source reaches as far in half the age: time enters by rate . t alone."""
+    """Twice the speed of run-off and source reaches as far in half the age: time enters by rate . t."""
     slow = run(STRIP, [0], -UP_X, age=1.0, steps=100)
     changed = replace(STAIN, rust_runoff_speed=4.0 * speed, rust_source_rate=3.0 * speed)
     np.testing.assert_allclose(
@@ -194,11 +196,13 @@ def test_a_streak_has_a_speed(speed: float) -> None:
 
 
 def test_the_number_of_steps_is_a_resolution() -> None:
-    """First order in the tick: the error against 6,400 steps falls like 1 / N, and is below 0.015 of 1 at 100 steps."""
+    """First order in the tick: the error against 6,400 steps falls like 1 / N, and is below 0.015 of 1 at 100
+    steps.
+    """
     exact = run(STRIP, [0], -UP_X, age=1.0, steps=6400)
     errors = [np.abs(run(STRIP, [0], -UP_X, age=1.0, steps=n) - exact).max() for n in (50, 100, 200, 400)]
     assert errors[1] < 0.015
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in pairwise(errors):
         assert fine < 0.7 * coarse
 
 
@@ -241,7 +245,7 @@ def test_last_bits_do_not_make_sources(seed: int) -> None:
 
 
 def test_side_neighbours_get_a_small_share() -> None:
-    """Straight down in the lattice two ways are equally good (30 degrees off): one takes over, the other a thousandth."""
+    """Straight down in the lattice two ways are equally good (30 degrees off): one takes over."""
     film = run(HEXAGON, [at(0)], UP_Y, age=0.01, steps=1, parameters=replace(STAIN, rust_source_rate=1e9))
     below = sorted(film[[at(-0.5, -zoo.HALF_ROOT_3), at(0.5, -zoo.HALF_ROOT_3)]])
     taken = 0.9 * np.exp(-1 / 3.0) * (1 - np.exp(-4.0 * 0.01))

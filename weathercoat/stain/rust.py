@@ -18,7 +18,7 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
-_LEVEL = 1e-9  # heights in sizes, and cosines, that differ by less are equal: on a grid last bits would decide
+_LEVEL = 1e-9  # heights in sizes, and cosines, that differ by less are equal: last bits must not decide
 
 
 @dataclass(frozen=True)
