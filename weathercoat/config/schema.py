@@ -262,7 +262,10 @@ class Flaking(Section):
         "islands", "Whole pieces that nothing holds any more, or single faces (the paper)"
     )
     hanging_share: Real = parameter(
-        0.08, "A piece also falls when less than this share of its outline still hangs", ge=0, lt=1
+        0.1,
+        "A piece also falls when it hangs by less than this share of the outline of a disc of its area",
+        ge=0,
+        lt=1,
     )
 
 

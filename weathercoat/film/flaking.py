@@ -21,8 +21,8 @@ def flake(
     square sizes.
 
     Literally only a face whose three edges are broken falls. By default a connected piece that no attached
-    vertex holds falls as a whole, and so does one that hangs by less than a share of its outline: it tears
-    off. Nothing can fall in a step in which nothing broke and no vertex was released.
+    vertex holds falls as a whole, and so does one that hangs by less than a share of its girth: it tears off.
+    Nothing can fall in a step in which nothing broke and no vertex was released.
     """
     face_count = len(mesh.alive)
     areas = np.empty(face_count)
@@ -163,10 +163,11 @@ def tear_hanging_pieces(
     seen: NDArray[np.bool_],
     queue: Indices,
 ) -> None:
-    """Break the last edges of each free piece that hangs by less than `share` of its outline.
+    """Break the last edges of each free piece that hangs by less than `share` of the girth of its area.
 
-    A piece hangs by the edges that it shares with faces that still have an attached corner. free: (m,) of
-    `find_free_faces`; seen, queue: scratch (m,).
+    A piece hangs by the edges that it shares with faces that still have an attached corner. Its girth is the
+    outline of a disc of its area: its own outline would count all cracks within it, and a wide web of film
+    that many points hold would fall at once. free: (m,) of `find_free_faces`; seen, queue: scratch (m,).
     """
     twin = mesh.twin
     stack = np.empty(len(twin), np.int32)
@@ -177,15 +178,14 @@ def tear_hanging_pieces(
         count, held = collect_piece(seed, twin, free, seen, queue)
         if not held:
             continue
-        outline = 0.0
+        area = 0.0
         hanging = 0.0
         for i in range(count):
+            area += rest_face_area(mesh, queue[i])
             for h in range(3 * queue[i], 3 * queue[i] + 3):
-                if twin[h] < 0:
-                    outline += rest_edge_length(mesh, h)
-                elif not free[twin[h] // 3]:
+                if twin[h] >= 0 and not free[twin[h] // 3]:
                     hanging += rest_edge_length(mesh, h)
-        if hanging >= share * (outline + hanging):
+        if hanging >= share * 2.0 * math.sqrt(math.pi * area):
             continue
         for i in range(count):
             for h in range(3 * queue[i], 3 * queue[i] + 3):

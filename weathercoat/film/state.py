@@ -57,7 +57,7 @@ class FilmParameters:
     fracture_rounds: str = "by_speed"  # or "one"
     fracture_speed: float = 20.0
     flaking_rule: str = "islands"  # or "faces"
-    flaking_hanging_share: float = 0.08
+    flaking_hanging_share: float = 0.1
 
 
 class FilmRules(NamedTuple):
