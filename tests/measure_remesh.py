@@ -123,7 +123,7 @@ def _count_fans(faces: NDArray[np.int32], edges: Edges) -> NDArray[np.int64]:
 def count_bad_faces(surface: Surface, source: Surface) -> tuple[int, int]:
     """Faces that are flipped, and degenerate ones (under 0.1°).
 
-    A flipped face opposes the input at its centre and at all its corners: detail smaller than a face does not count.
+    A flipped face opposes the input at its centre and at all its corners, so not mere detail below it.
     """
     import igl
 

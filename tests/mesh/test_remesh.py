@@ -88,7 +88,7 @@ def check_editable(mesh: EditableMesh, euler: int) -> None:
 def checked_passes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Checks the mesh after every pass of the loop; the list gets the Euler number to expect."""
     euler: list[int] = []
-    for name in ("_split", "_collapse"):
+    for name in ("_split", "_collapse", "_remove_poor_faces"):
         inner = getattr(remesh_module, name)
 
         def checked(*arguments: object, inner: object = inner) -> EditableMesh:

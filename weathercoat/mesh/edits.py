@@ -132,7 +132,7 @@ def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: V
             new_x, new_y, new_z = _corner_normal(p, v, b, c)
             new_shape = shape_of(p, v, b, c)
             p[v, 0], p[v, 1], p[v, 2] = old_x, old_y, old_z
-            if new_shape < _LEAST_SHAPE and new_shape <= shape:
+            if new_shape < min(shape, _LEAST_SHAPE):
                 return False
             size = np.sqrt((x * x + y * y + z * z) * (new_x * new_x + new_y * new_y + new_z * new_z))
             if shape > _LEAST_SHAPE and x * new_x + y * new_y + z * new_z < _LEAST_COSINE * size:
@@ -140,7 +140,7 @@ def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: V
             source = mesh.source[h // 3]
             nx, ny, nz = normals[source, 0], normals[source, 1], normals[source, 2]
             facing = new_x * nx + new_y * ny + new_z * nz
-            if facing <= 0.0 and (shape <= _LEAST_SHAPE or x * nx + y * ny + z * nz > 0.0):
+            if facing < 0.0 and (shape <= _LEAST_SHAPE or x * nx + y * ny + z * nz > 0.0):
                 return False
         h = mesh.twin[prev_of(h)]
         if h < 0 or h == first:

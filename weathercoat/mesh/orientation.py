@@ -30,14 +30,14 @@ _STEP = np.radians(2.5)  # per turn, so that flips can follow
 
 
 class FlatParts(NamedTuple):
-    """label: int32 (m,), the flat part of each input face or -1; axes: (k, 2, 3), unit vectors in its plane."""
+    """label: int32 (m,), the flat part of each input face or -1; axes: (k, 2, 3), unit vectors in it."""
 
     label: Indices
     axes: Vectors
 
 
 def find_flat_parts(normals: Vectors, areas: Vectors, twin: Indices, edge_length: float) -> FlatParts:
-    """Flat parts of an input with the unit normals (m, 3) and areas (m,) that are worth many edges of that length."""
+    """Flat parts, large for that edge length, of an input with unit normals (m, 3) and areas (m,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -70,7 +70,7 @@ def balance_directions(
     regularity: float,
     random: np.random.Generator,
 ) -> None:
-    """Turn discs in the flat parts that have a preferred direction; `regularity` is that of `edits.flip_edges`."""
+    """Turn discs in flat parts that have a preferred direction; `regularity` is that of `flip_edges`."""
     count = int(mesh.count[0])
     turn, centre = np.zeros(count), np.zeros((count, 3))
     part = parts_of_vertices(mesh, parts.label)
@@ -180,7 +180,7 @@ def gather_disc(
     disc: Indices,
     inside: NDArray[np.bool_],
 ) -> int:
-    """Vertices within `radius` of `start`, written to `disc`, marked in `inside`; 0 where not all are free in part k."""
+    """Write the vertices within `radius` of `start` to `disc`; 0 where not all are free ones of part k."""
     p = mesh.position
     disc[0] = start
     inside[start] = True

@@ -61,7 +61,7 @@ class RemeshParameters:
     crease_angle: float = 30.0
     iterations: int = 12
     seed: int = 0
-    face_limit: int = 20_000_000
+    face_limit: int = 500_000
 
 
 def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
@@ -109,7 +109,7 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
 def _turn_back(
     barycentric: Vectors, ordered: Surface, face: Indices, surface: Surface, old_face: Indices
 ) -> Vectors:
-    """The weights (n, 3) of the corners of the ordered faces (n,) as weights of those of the input's faces (n,)."""
+    """Weights (n, 3) in the corners of the ordered faces (n,) as those of the input's own faces (n,)."""
     begins = ordered.vertices[ordered.faces[face, 0]][:, None]
     corner = np.argmax(np.all(surface.vertices[surface.faces[old_face]] == begins, axis=2), axis=1)
     return np.take_along_axis(barycentric, (np.arange(3) - corner[:, None]) % 3, axis=1)
@@ -134,14 +134,15 @@ def _require_limit(
     def needed(length: float) -> float:
         return float(np.sum(areas) / (0.2 * length**2) + np.sum(2.0 * longest / length))
 
-    if needed(edge_length) <= parameters.face_limit:
+    limit = max(parameters.face_limit, 8 * parameters.faces)
+    if needed(edge_length) <= limit:
         return
     fits = edge_length
-    while needed(fits) > parameters.face_limit:
+    while needed(fits) > limit:
         fits *= 1.1
     raise LimitError(
         f"edges of {edge_length * size:.3g} split the long faces of this model into about "
-        f"{needed(edge_length):.2g} faces, more than {parameters.face_limit}",
+        f"{needed(edge_length):.2g} faces, more than {limit}",
         remedy=f"ask for fewer faces, so that edges are {fits * size:.3g} long or longer",
     )
 
@@ -167,6 +168,7 @@ def _iterate(
     for number in range(parameters.iterations):
         mesh = _split(mesh, features, length * _SPLIT, length * _SPLIT, random)
         mesh = _collapse(mesh, features, source, length, random)
+        mesh = _remove_poor_faces(mesh, features, source, length)
         length *= float(np.clip(np.sqrt(mesh.count[1] / parameters.faces), 0.9, 1.1))
         flip_edges(mesh, source.normals, 10, _REGULARITY)
         for _ in range(2):
@@ -231,6 +233,7 @@ def _meet_count(
 ) -> EditableMesh:
     """Collapse the shortest edges or split the longest ones until about the wanted number of faces is met."""
     for _ in range(_FINAL_ROUNDS):
+        mesh = _remove_poor_faces(mesh, features, source, length)
         surplus = (int(mesh.count[1]) - faces) // 2
         lengths = edge_lengths(mesh)
         inner = np.flatnonzero((lengths >= 0) & (mesh.crease[: len(lengths)] < 0)).astype(np.int32)
@@ -246,7 +249,21 @@ def _meet_count(
         for _ in range(2):
             flip_edges(mesh, source.normals, 5, _REGULARITY)
             _relax(mesh, features, source, edge_length)
-    return mesh
+    return compact(mesh)
+
+
+def _remove_poor_faces(
+    mesh: EditableMesh, features: Features, source: InputSurface, length: float
+) -> EditableMesh:
+    """Collapse the shortest edge of poor triangles, whatever its length."""
+    poor = np.flatnonzero(face_shapes(mesh) < _POOR)
+    lengths = edge_lengths(mesh)
+    half_edges = 3 * poor[:, None] + np.arange(3)
+    half_edges = np.maximum(half_edges, mesh.twin[half_edges])
+    shortest = half_edges[np.arange(len(poor)), np.argmin(lengths[half_edges], axis=1)]
+    chosen = np.unique(shortest).astype(np.int32)
+    collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
+    return compact(mesh)
 
 
 def _relax(mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float) -> None:
