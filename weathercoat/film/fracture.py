@@ -9,7 +9,14 @@ import math
 import numpy as np
 
 from weathercoat.compile import kernel
-from weathercoat.film.state import FilmParameters, FilmRules, FilmState, inherit_film, make_film_rules
+from weathercoat.film.state import (
+    FilmParameters,
+    FilmRules,
+    FilmState,
+    inherit_film,
+    make_film_rules,
+    tension_at,
+)
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
@@ -58,16 +65,44 @@ def edge_overload(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int
     """Tension of the two faces of an inner edge over its cohesion now, the direction factor included.
 
     Where an end is a tip and the way from it to the other end goes on in the tip's direction (dot product at
-    least alpha, on the rest surface), the cohesion counts beta times, once.
+    least alpha, on the rest surface), the cohesion counts beta times, once, and of the tensions counts what
+    pulls across the edge.
     """
     g = mesh.twin[h]
-    load = state.tension_now[h // 3] + state.tension_now[g // 3]
+    a, b = mesh.tail[h], mesh.tail[g]
     bond = min(cohesion_at(state, rules, h, age), cohesion_at(state, rules, g, age))
-    if leads_on(mesh, state, rules, mesh.tail[h], mesh.tail[g]) or leads_on(
-        mesh, state, rules, mesh.tail[g], mesh.tail[h]
-    ):
+    if leads_on(mesh, state, rules, a, b) or leads_on(mesh, state, rules, b, a):
         bond *= rules.direction_factor
+        load = tension_across(mesh, state, rules, h // 3, a, b, age)
+        load += tension_across(mesh, state, rules, g // 3, a, b, age)
+    else:
+        load = state.tension_now[h // 3] + state.tension_now[g // 3]
     return load / bond if bond > 0.0 else math.inf
+
+
+@kernel
+def tension_across(
+    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, f: int, a: int, b: int, age: float
+) -> float:
+    """Tension of face f now that pulls across the edge from a to b.
+
+    A free edge unloads the film across itself but not along itself, so a crack beside another one stops while
+    one that comes straight at it runs on into it. Without this the film between them never comes apart where
+    edges are much shorter than the shear lag.
+    """
+    along = 0.0
+    length = 0.0
+    relieved = 0.0
+    for axis in range(3):
+        step = mesh.rest_positions[mesh.origin[b], axis] - mesh.rest_positions[mesh.origin[a], axis]
+        along += state.relief[f, axis] * step
+        length += step * step
+        relieved += state.relief[f, axis] ** 2
+    tension = state.tension_now[f]
+    if relieved == 0.0 or length == 0.0:
+        return tension
+    full = tension_at(rules.tension_initial, 0.0, 1.0, rules.tension_rate, rules.saturating, age)
+    return tension + max(full - tension, 0.0) * max(1.0 - along * along / length, 0.0)
 
 
 @kernel
@@ -117,9 +152,7 @@ def find_overloaded(
         least = min(cohesion[h], cohesion[g])
         if fray_age[h // 3] < age or fray_age[g // 3] < age:
             least *= most_frayed
-        if is_tip[a] or is_tip[b]:
-            least *= rules.direction_factor
-        if tension[h // 3] + tension[g // 3] <= least:
+        if tension[h // 3] + tension[g // 3] <= least and not (is_tip[a] or is_tip[b]):
             continue
         load = edge_overload(mesh, state, rules, h, age)
         if load > 1.0:
@@ -194,9 +227,11 @@ def break_edge(
     tip_start, tip_end = cut_edge(mesh, log, h)
     inherit_film(state, log, first_split)
     if tip_start:
-        point_tip(mesh, state, start, origins[1], origins[0])
+        state.is_tip[start] = True
+        rest_direction(mesh, origins[1], origins[0], state.crack_direction[start])
     if tip_end:
-        point_tip(mesh, state, end, origins[0], origins[1])
+        state.is_tip[end] = True
+        rest_direction(mesh, origins[0], origins[1], state.crack_direction[end])
     for side in range(2):
         f = h // 3 if side == 0 else g // 3
         state.fray_age[f] = min(state.fray_age[f], age)
@@ -207,16 +242,14 @@ def break_edge(
 
 
 @kernel
-def point_tip(mesh: HalfEdgeMesh, state: FilmState, tip: int, source: int, target: int) -> None:
-    """Record at `tip` the direction of the crack that ends there, at rest, from origin `source`."""
-    state.is_tip[tip] = True
+def rest_direction(mesh: HalfEdgeMesh, source: int, target: int, out: Vectors) -> None:
+    """Unit vector at rest from one origin to another into out (3,); zero where they coincide."""
     length = 0.0
     for axis in range(3):
-        length += (mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]) ** 2
-    length = math.sqrt(length)
-    for axis in range(3):
-        step = mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]
-        state.crack_direction[tip, axis] = step / length if length > 0.0 else 0.0
+        out[axis] = mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]
+        length += out[axis] ** 2
+    if length > 0.0:
+        out /= math.sqrt(length)
 
 
 @kernel
@@ -265,6 +298,7 @@ def unload_round_crack(
         if cap >= state.tension_cap[f]:
             continue
         set_tension(state, f, min(state.tension_now[f], cap), cap, age)
+        rest_direction(mesh, start, end, state.relief[f])
         for h in range(3 * f, 3 * f + 3):
             g = mesh.twin[h]
             if g >= 0:

@@ -64,6 +64,7 @@ class FilmRules(NamedTuple):
     """The parameters that kernels need while edges break, as numbers."""
 
     saturating: bool
+    tension_initial: float
     tension_rate: float
     cohesion_decay_rate: float
     direction_threshold: float
@@ -79,6 +80,7 @@ class FilmState(NamedTuple):
     while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
     there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at its
     last event, the age of it, and what it tends to; tension_now (m,), evaluated at the age of the step;
+    relief (m, 3), the direction at rest of the broken edge that relaxed the face most, zero where none did;
     fray_age (m,), when the face got its first broken edge, infinite before. Half-edges: cohesion (3 m,)
     before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie uint64 (3 m,), a hash of the
     edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a round of fracture
@@ -95,6 +97,7 @@ class FilmState(NamedTuple):
     tension_age: Vectors
     tension_cap: Vectors
     tension_now: Vectors
+    relief: Vectors
     fray_age: Vectors
     cohesion: Vectors
     lift_factor: Vectors
@@ -110,6 +113,7 @@ def make_film_rules(parameters: FilmParameters) -> FilmRules:
     p = parameters
     return FilmRules(
         saturating=p.tension_law == "saturating",
+        tension_initial=p.tension_initial,
         tension_rate=p.tension_rate,
         cohesion_decay_rate=p.cohesion_decay_rate,
         direction_threshold=p.fracture_direction_threshold,
@@ -151,6 +155,7 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
         tension_age=np.zeros(face_count),
         tension_cap=np.ones(face_count),
         tension_now=np.full(face_count, p.tension_initial),
+        relief=np.zeros((face_count, 3)),
         fray_age=np.full(face_count, np.inf),
         cohesion=cohesion,
         lift_factor=lift_factor,
