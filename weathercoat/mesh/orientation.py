@@ -23,7 +23,7 @@ from weathercoat.mesh.surface import Indices, Vectors
 
 _FLAT = 1e-4  # faces belong to one flat part where their normals differ by less [rad]
 _LEAST_FACES = 400.0  # smaller parts are not balanced
-_RADIUS = 4.0  # of the discs, in edge lengths
+_RADII = (4.0, 2.5)  # of the discs, in edge lengths; small ones where no large one fits or is left
 _BALANCED = 0.01  # order at which a part is left alone
 _LEAST_GAIN = 1.2  # of a disc's own sum, by which turning it must lessen that of its part; 2 is the most
 _STEP = np.radians(2.5)  # per turn, so that flips can follow
@@ -75,9 +75,10 @@ def balance_directions(
     turn, centre = np.zeros(count), np.zeros((count, 3))
     part = parts_of_vertices(mesh, parts.label)
     part[mesh.chain[:count] != FREE] = -1
+    radii = edge_length * np.array(_RADII)
     for k in range(len(parts.axes)):
         inside = random.permutation(np.flatnonzero(part == k).astype(np.int32))
-        choose_turns(inside, k, part, parts.label, parts.axes[k], _RADIUS * edge_length, mesh, turn, centre)
+        choose_turns(inside, k, part, parts.label, parts.axes[k], radii, mesh, turn, centre)
     steps = int(np.ceil(np.abs(turn).max(initial=0.0) / _STEP))
     arc = mesh.arc[:count]
     moved = turn != 0
@@ -124,7 +125,7 @@ def choose_turns(
     part: Indices,
     label: Indices,
     axes: Vectors,
-    radius: float,
+    radii: Vectors,
     mesh: EditableMesh,
     turn: Vectors,
     centre: Vectors,
@@ -139,10 +140,11 @@ def choose_turns(
     taken = np.zeros(mesh.count[0], np.bool_)
     disc = np.empty(len(candidates), np.int32)
     inside = np.zeros(mesh.count[0], np.bool_)
-    for i in range(len(candidates)):
+    for trial in range(len(radii) * len(candidates)):
         if abs(total) < _BALANCED * edges:
             break
-        size = gather_disc(candidates[i], k, radius, part, taken, mesh, disc, inside)
+        i = trial % len(candidates)
+        size = gather_disc(candidates[i], k, radii[trial // len(candidates)], part, taken, mesh, disc, inside)
         own = complex(0.0, 0.0)
         for j in range(size):
             first = mesh.half_edge[disc[j]]

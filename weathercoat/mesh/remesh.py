@@ -176,7 +176,7 @@ def _iterate(
             flip_edges(mesh, source.normals, 5, _REGULARITY)
         if number in (parameters.iterations // 3, parameters.iterations // 2):
             _release_poor_creases(mesh, features, edge_length)
-        if parameters.iterations // 2 <= number and (parameters.iterations - number) % 2 == 0:
+        if number >= parameters.iterations // 2:
             balance_directions(mesh, features, source.normals, parts, edge_length, _REGULARITY, random)
     return _meet_count(mesh, features, source, length, edge_length, parameters.faces)
 
