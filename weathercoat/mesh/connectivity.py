@@ -42,7 +42,7 @@ class EditableMesh(NamedTuple):
     twin: Indices
     crease: Indices
     source: Indices
-    count: NDArray[np.int64]
+    count: NDArray[np.int64]  # type: ignore[assignment]
 
 
 def make_editable_mesh(
