@@ -21,6 +21,7 @@ from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
 _REACH = 3.0  # shear lags beyond which a crack no longer unloads the film: exp(-3) is 5 %
+_EQUAL = 1e-9  # caps and overloads that differ by less are equal: on a grid last bits would decide
 
 
 def fracture(
@@ -55,7 +56,7 @@ def fracture(
             found = find_overloaded_at_tips(mesh, state, rules, age, log, first_break, candidates, overload)
         if found == 0:
             return
-        order = np.lexsort((state.tie[candidates[:found]], -overload[:found]))
+        order = np.lexsort((state.tie[candidates[:found]], -np.round(overload[:found] / _EQUAL)))
         first_break = int(log.counts[1])
         break_in_order(mesh, state, rules, age, candidates[:found][order], log, stack)
 
@@ -280,7 +281,7 @@ def unload_round_crack(
     A free edge unloads the film beside it over the shear lag: caps fall to 1 - exp(-r / lambda) at the
     distance r, and tensions are clipped to them. What lies ahead of a tip, within alpha of its direction, is
     not unloaded: that is where the stress of a crack goes. A face that is as relaxed already is not crossed,
-    since what lies behind it is as well.
+    since what lies behind it mostly is as well.
     """
     depth = 1
     stack[0] = seed
@@ -295,7 +296,7 @@ def unload_round_crack(
         ):
             continue
         cap = 1.0 - math.exp(-distance / rules.shear_lag)
-        if cap >= state.tension_cap[f]:
+        if cap >= state.tension_cap[f] - _EQUAL:
             continue
         set_tension(state, f, min(state.tension_now[f], cap), cap, age)
         rest_direction(mesh, start, end, state.relief[f])
