@@ -22,7 +22,7 @@ from weathercoat.mesh.smoothing import apply_moves
 from weathercoat.mesh.surface import Indices, Vectors
 
 _FLAT = 1e-4  # faces belong to one flat part where their normals differ by less [rad]
-_LEAST_FACES = 400.0  # smaller parts are not balanced
+_LEAST_FACES = 800.0  # smaller parts are not balanced
 _RADII = (4.0, 2.5)  # of the discs, in edge lengths; small ones where no large one fits or is left
 _BALANCED = 0.01  # order at which a part is left alone
 _LEAST_GAIN = 1.2  # of a disc's own sum, by which turning it must lessen that of its part; 2 is the most

@@ -40,7 +40,7 @@ _MOST_SHUFFLES = (
     100  # passes of random splits, more than the longest edge that the limit of faces allows can need
 )
 _SPRING = 0.5  # weight of springs against the mean of the neighbours
-_REGULARITY = 0.5  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
+_REGULARITY = 0.7  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
 _FINAL_ROUNDS = 2  # of the correction of the number of faces
 _LONGEST = 1.7  # of the target length, for edges that this correction makes
 _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the short crease beside them
