@@ -557,7 +557,7 @@ def test_only_a_crack_that_comes_straight_feels_the_tension_along_another() -> N
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("scatter", [0.0, 0.2])
 def test_last_bits_do_not_decide_what_breaks(scatter: float, seed: int) -> None:
-    """On a grid caps and overloads agree but for round-off: errors of 1e-14 change no break in eight calls."""
+    """On a grid caps and overloads agree but for round-off: errors of 1e-14 change no break."""
     grid = make_plate(columns=12, rows=12)
 
     def breaks(surface: Surface, film_seed: int) -> list[set[Edge]]:
