@@ -5,16 +5,14 @@ targets (k,): the wanted bend, phi_0 - pi [rad]. Each hinge has at least one ver
 change positions, in order.
 
 - `project_dihedrals`: the signed dihedral with its exact gradient over the four points; valid for every fold.
-The error
-  is taken by half angles, e = 2 tan((bend - target) / 2), which needs no trigonometry in the loop, equals the
-  difference to third order, and is clamped to 1, so that no correction turns a face by more than about a
-  radian.
+  The error is taken by half angles, e = 2 tan((bend - target) / 2), which needs no trigonometry in the loop,
+  equals the difference to third order, and is clamped to 1, so that no correction turns a face by more than
+  about a radian.
 - `project_split_angles`: the paper's form (4.3). Each face is turned about the edge until it makes half the
-outer dihedral with
-  the neutral direction n = (n1 + n2) / |n1 + n2|, which is held constant. Degenerates where n1 = -n2.
+  outer dihedral with the neutral direction n = (n1 + n2) / |n1 + n2|, which is held constant. Degenerates
+  where n1 = -n2.
 - `project_arccos_angles`: C = arccos(-n1 . n2) - phi_0 (Mueller et al., 2007). It cannot tell a ridge from a
-valley, and has no
-  gradient where the hinge is flat: such hinges stay.
+  valley, and has no gradient where the hinge is flat: such hinges stay.
 """
 
 from __future__ import annotations
