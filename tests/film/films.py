@@ -10,13 +10,13 @@ from tests.zoo import find_edge, find_half_edge, make_mesh
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.lift import disturb
+from weathercoat.film.start import make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmRules,
     FilmState,
     evaluate_tension,
     make_film_rules,
-    make_film_state,
 )
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, check_half_edges, make_event_log
 from weathercoat.mesh.surface import Indices, Surface, Vectors

@@ -14,7 +14,8 @@ import pytest
 
 from tests import zoo
 from tests.film.films import Film, make_film
-from weathercoat.film.fracture import break_edge, cohesion_at, edge_overload, find_overloaded, tension_across
+from weathercoat.film.fracture import break_edge, cohesion_at, edge_overload, find_overloaded
+from weathercoat.film.relaxation import tension_across
 from weathercoat.film.state import evaluate_tension
 from weathercoat.mesh.halfedge import check_half_edges
 from weathercoat.mesh.shapes import make_plate, make_random_sheet

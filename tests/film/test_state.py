@@ -7,6 +7,7 @@ import pytest
 
 from tests import zoo
 from tests.film.films import STEADY, make_film
+from weathercoat.film.start import make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmState,
@@ -14,7 +15,6 @@ from weathercoat.film.state import (
     drying_tension,
     evaluate_tension,
     make_film_rules,
-    make_film_state,
     tension_at,
 )
 from weathercoat.mesh.halfedge import HalfEdgeMesh

@@ -5,18 +5,15 @@ Stoney).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.film.state import FilmState
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
-
-if TYPE_CHECKING:
-    from weathercoat.film.state import FilmState
 
 
 @kernel

@@ -20,13 +20,13 @@ from weathercoat.deform.sweeps import (
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import find_separating, separate
+from weathercoat.film.start import make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmState,
     adhesion_at,
     evaluate_tension,
     make_film_rules,
-    make_film_state,
 )
 from weathercoat.mesh.frame import Frame, make_frame
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, make_event_log, make_half_edges
