@@ -1,7 +1,7 @@
 """Makes the generated pages and every picture of the documentation anew: all of them, or some by name.
 
     python docs/make.py                     all of it
-    python docs/make.py pages               configuration.md, errors.md and gallery.md
+    python docs/make.py pages               configuration.md, errors.md, gallery.md and python.md
     python docs/make.py effects             the effect of each parameter, images/parameters
     python docs/make.py effects --key curl.radius
     python docs/make.py comparison          the default beside the paper's literal rules

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator
 
+import weathercoat
 from making import effects, gallery
 from making.places import DOCS, IMAGES
 from weathercoat import errors
@@ -46,6 +48,29 @@ $ weathercoat run rusting barrel.obj -o barrel --set 'snapshots.steps=[0, 200, 4
 
 `python docs/make.py gallery` makes all of them. For `literal` beside `standard` see
 [the method](method.md#the-literal-rules-and-the-default-side-by-side).
+"""
+
+_ABOUT_PYTHON = """\
+# In Python
+
+This page is made by `make docs` from the docstrings of `weathercoat.api`. Four functions, each a step of what
+`weathercoat run` does:
+
+```python
+import weathercoat
+
+weathercoat.write("plate.ply", weathercoat.read("sign.obj"))
+surface = weathercoat.remesh(weathercoat.read("plate.ply", up="y"), faces=2000)
+simulation = weathercoat.simulate(surface, "curling", until=0.5)
+while simulation.age < 0.6:
+    simulation.step()
+weathercoat.write("curled.png", simulation.snapshot())
+```
+
+A `Surface` is frozen, with plain NumPy arrays (`vertices`, `faces`, `groups`, `notes`, ...). A `Simulation`
+steps and hands out snapshots; `residual()` says how well the film meets its constraints. A `Snapshot` is film
+and metal at one moment as plain arrays, the same that [the PLY](formats.md#ply) holds. Every error is a
+subclass of `weathercoat.errors.WeathercoatError` and carries its [code and exit code](errors.md).
 """
 
 _EXIT_CODES = {
@@ -176,6 +201,30 @@ def _summary(error: type[errors.WeathercoatError]) -> str:
     return " ".join((error.__doc__ or "").partition("\n\n")[0].split())
 
 
+def python_page() -> str:
+    """The functions of the Python interface, with their signatures and docstrings."""
+    lines = [_ABOUT_PYTHON.rstrip()]
+    for name in weathercoat.__all__:
+        function = getattr(weathercoat, name)
+        lines += ["", f"## `{name}`", "", "```text", _signature(name, function), "```", ""]
+        lines += [inspect.getdoc(function) or ""]
+    return "\n".join(lines) + "\n"
+
+
+def _signature(name: str, function: Callable[..., object]) -> str:
+    """The signature of a function, a line for each parameter."""
+    signature = inspect.signature(function)
+    lines = [f"{name}("]
+    is_keyword_only = False
+    for parameter in signature.parameters.values():
+        if parameter.kind is parameter.KEYWORD_ONLY and not is_keyword_only:
+            is_keyword_only = True
+            lines.append("    *,")
+        default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}"
+        lines.append(f"    {parameter.name}: {parameter.annotation}{default},")
+    return "\n".join([*lines, f") -> {signature.return_annotation}"])
+
+
 def gallery_page() -> str:
     """Every shipped config on every part, with the command that makes the picture."""
     lines = [_ABOUT_GALLERY.rstrip()]
@@ -207,6 +256,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration_page,
     "errors.md": errors_page,
     "gallery.md": gallery_page,
+    "python.md": python_page,
 }
 
 
