@@ -282,4 +282,4 @@ class _SnapshotRecorder:
             for snapshot in self.snapshots
         ]
         labels = [f"age {snapshot.age:g}" for snapshot in self.snapshots]
-        write_png(path, contact_sheet(images, labels, min(3, len(images))))
+        write_png(path, contact_sheet(images, labels))

@@ -257,6 +257,8 @@ def test_a_contact_sheet_places_pictures_in_rows_and_labels_them() -> None:
     assert sheet.shape == (120, 240, 3)
     assert (sheet[:30, 80:160] == 200).all() and (sheet[60:90, :80] == 100).all()
     assert (sheet[30:60, :40] != 250).any()
+    shapes = [contact_sheet(images[:1] * n, ["a"] * n).shape[:2] for n in (1, 3, 4, 5, 10)]
+    assert shapes == [(60, 80), (60, 240), (120, 160), (120, 240), (180, 320)]
 
 
 def test_png_is_written_and_a_missing_folder_is_an_output_error(tmp_path: Path) -> None:

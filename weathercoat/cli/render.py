@@ -69,7 +69,7 @@ def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
     ]
     if step is not None:
         return images[0]
-    return contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in snapshots], min(3, len(images)))
+    return contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in snapshots])
 
 
 def _config_of(report: dict[str, Any], path: Path) -> Config:

@@ -5,6 +5,7 @@ They need no display, no GPU and no system packages. Same input, same bytes: eve
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -247,14 +248,16 @@ def _palette(parameters: PictureParameters) -> Vectors:
     return palette
 
 
-def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int) -> Image:
+def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int | None = None) -> Image:
     """Pictures of one size in rows of `columns`, each with a small label in its lower left corner; uint8 (h,
-    w, 3).
+    w, 3). By default up to three are in a row, and more in a square.
     """
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
     height, width = images[0].shape[:2]
+    if columns is None:
+        columns = len(images) if len(images) <= 3 else math.ceil(math.sqrt(len(images)))
     rows = -(-len(images) // columns)
     sheet = Pillow.new("RGB", (columns * width, rows * height), tuple(int(c) for c in images[0][0, 0]))
     draw = ImageDraw.Draw(sheet)
