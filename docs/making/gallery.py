@@ -73,8 +73,9 @@ def draw_first() -> None:
         _call("sample", "sign", "-o", folder / "sign.obj")
         steps = _assignments(["snapshots.steps=[0, 200, 400, 600, 800, 1000]"])
         _call("run", "standard", folder / "sign.obj", "-o", folder / "sign", *steps)
-        sheet = Image.open(folder / "sign" / "preview.png")
-        save_picture(sheet.resize((1440, 720), Image.Resampling.LANCZOS), IMAGES / "sign.webp")
+        sheet = Image.open(folder / "sign" / "preview.png").convert("RGB")
+        sheet.thumbnail((1440, 1440), Image.Resampling.LANCZOS)
+        save_picture(sheet, IMAGES / "sign.webp")
 
 
 def _assignments(settings: Iterable[str]) -> list[str]:
