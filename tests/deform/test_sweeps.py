@@ -69,6 +69,12 @@ def test_interleave_is_a_permutation_in_strides(count: int) -> None:
     assert order[: (count + 60) // 61].tolist() == list(range(0, count, 61))
 
 
+def test_interleave_stays_within_a_tile() -> None:
+    tile = 64 * 61
+    order = interleave(3 * tile + 100)
+    assert (order // tile == np.arange(len(order)) // tile).all()
+
+
 def test_an_attached_film_has_no_constraint() -> None:
     mesh, constraints = released(zoo.make_disc(), [])
     assert len(constraints.length_ends) == len(constraints.hinges) == len(constraints.free_vertices) == 0
