@@ -392,8 +392,8 @@ def _revolve(profile: Vectors, segments: int, *, closed: bool) -> tuple[Vectors,
 
 
 def _arc(centre: Sequence[float], radius: float, start: float, sweep: float, edge_length: float) -> Vectors:
-    """Points on an arc, both ends included, (n, 2): at least eight to a circle."""
-    steps = max(math.ceil(abs(sweep) * radius / edge_length), math.ceil(4 * abs(sweep) / np.pi))
+    """Points on an arc, both ends included, (n, 2): at least 24 to a circle, so that it is no crease."""
+    steps = max(math.ceil(abs(sweep) * radius / edge_length), math.ceil(12 * abs(sweep) / np.pi))
     turn = start + sweep * np.arange(steps + 1) / steps
     return np.asarray(centre) + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
 
