@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from io import BytesIO
@@ -17,7 +17,7 @@ from weathercoat.compile import is_cold
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.deform.sweeps import DeformParameters
-from weathercoat.errors import CheckError, NoFacesError, StrictError
+from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import read_stream, read_surface
@@ -85,30 +85,19 @@ def run_asset(
     config = loaded.config
     say = log or (lambda line: None)
     watch = Stopwatch()
-    if is_cold():
-        say("compiling on this first run, which takes about a minute; later runs start at once")
     with run_folder.RunFolder(out, overwrite=overwrite) as folder:
+        announce_compiling(say)
         with watch.time("read"):
             surface, inputs = _read(model, format, config)
         name = next(iter(inputs))
-        painted, untouched = split_paint(surface, config)
-        with watch.time("remesh"):
-            meshed = painted
-            if config.remesh:
-                meshed = remesh(
-                    painted,
-                    RemeshParameters(
-                        faces=config.remesh.faces, crease_angle=config.remesh.crease_angle, seed=config.seed
-                    ),
-                )
-        for note in meshed.notes:
-            say(f"{name}: {note.code}({note.count}): {note.message}")
-        if strict and meshed.notes:
-            first = meshed.notes[0]
-            raise StrictError(f"{first.code}({first.count}): {first.message}", file=name)
-
-        with watch.time("prepare"):
-            simulation = prepare_simulation(meshed, config, painted)
+        with name_errors(name):
+            report_notes(surface.notes, name, say, strict=strict)
+            painted, untouched = split_paint(surface, config)
+            with watch.time("remesh"):
+                meshed = _remeshed(painted, config)
+            report_notes(meshed.notes[len(surface.notes) :], name, say, strict=strict)
+            with watch.time("prepare"):
+                simulation = prepare_simulation(meshed, config, painted)
         recorder = _SnapshotRecorder(folder, config, untouched, watch)
         due = config.snapshots.due(config.ageing.steps)
         run_simulation(simulation, [Recorder(due, recorder.record)], progress)
@@ -145,6 +134,43 @@ def _read(model: str | Path | BinaryIO, format: str | None, config: Config) -> t
         return surface, {Path(model).name: sha256(Path(model))}
     content = model.read()
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
+
+
+def announce_compiling(say: Callable[[str], None]) -> None:
+    """Explain the wait where the kernels are not compiled yet."""
+    if is_cold():
+        say("compiling on this first run, which takes about a minute; later runs start at once")
+
+
+@contextmanager
+def name_errors(name: str) -> Iterator[None]:
+    """Name the model in errors of rooms that know no files."""
+    try:
+        yield
+    except WeathercoatError as error:
+        error.file = error.file or name
+        raise
+
+
+def report_notes(
+    notes: Sequence[Note], name: str, say: Callable[[str], None], *, strict: bool = False
+) -> None:
+    """Say each note; raises StrictError for the first where `strict`."""
+    for note in notes:
+        say(f"{name}: {note.code}({note.count}): {note.message}")
+    if strict and notes:
+        first = notes[0]
+        raise StrictError(f"{first.code}({first.count}): {first.message}", file=name)
+
+
+def _remeshed(painted: Surface, config: Config) -> Surface:
+    """The surface as the config wants it for the simulation: remeshed, or as it is."""
+    wanted = config.remesh
+    if not wanted:
+        return painted
+    return remesh(
+        painted, RemeshParameters(faces=wanted.faces, crease_angle=wanted.crease_angle, seed=config.seed)
+    )
 
 
 def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | None]:

@@ -15,9 +15,9 @@ from pathlib import Path
 import click
 import pytest
 
-from weathercoat.cli import handler
 from weathercoat.cli.handler import call
 from weathercoat.cli.root import weathercoat
+from weathercoat.cli.signals import Terminated
 from weathercoat.errors import CheckError, FormatError, WeathercoatError
 
 COMMAND = [sys.executable, "-m", "weathercoat"]
@@ -66,7 +66,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
         ),
         (KeyboardInterrupt(), 130, "interrupted"),
         (click.Abort(), 130, "interrupted"),
-        (handler.Terminated(), 143, "terminated"),
+        (Terminated(), 143, "terminated"),
     ],
 )
 def test_one_line_and_a_code(

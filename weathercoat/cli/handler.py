@@ -10,31 +10,26 @@ import contextlib
 import errno
 import json
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
-from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 import click
 
 from weathercoat.cli.root import weathercoat
+from weathercoat.cli.signals import Interrupted, Stopped
 from weathercoat.errors import ConfigError, LimitError, OutputError, UsageError, WeathercoatError
 
 PROGRAM = "weathercoat"
 COMPLETION_VARIABLE = "_WEATHERCOAT_COMPLETE"
-_INTERRUPTED, _BROKEN_PIPE, _TERMINATED = 130, 141, 143
+_BROKEN_PIPE = 141
 _DEVICE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-class Terminated(BaseException):
-    """SIGTERM, as an exception so that whatever is half-written is cleaned up."""
-
-
-def main() -> NoReturn:
-    """The entry point: run the command line of this process and exit."""
+def run() -> int:
+    """Run the command line of this process and return its exit code."""
     if isinstance(sys.stdout, TextIOWrapper):
         # A path that is no valid text, or a sign that the terminal lacks, is no reason to fail.
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -42,9 +37,8 @@ def main() -> NoReturn:
     if instruction:
         from click.shell_completion import shell_complete
 
-        sys.exit(shell_complete(weathercoat, {}, PROGRAM, COMPLETION_VARIABLE, instruction))
-    signal.signal(signal.SIGTERM, _raise_terminated)
-    sys.exit(call(sys.argv[1:]))
+        return shell_complete(weathercoat, {}, PROGRAM, COMPLETION_VARIABLE, instruction)
+    return call(sys.argv[1:])
 
 
 def call(arguments: Sequence[str]) -> int:
@@ -61,9 +55,9 @@ def call(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return _BROKEN_PIPE
     except (KeyboardInterrupt, click.Abort):
-        return _stop("interrupted", _INTERRUPTED)
-    except Terminated:
-        return _stop("terminated", _TERMINATED)
+        return _stop(Interrupted)
+    except Stopped as stopped:
+        return _stop(type(stopped))
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return error.exit_code
@@ -114,16 +108,12 @@ def _as_dict(error: WeathercoatError) -> dict[str, Any]:
     return content
 
 
-def _stop(word: str, code: int) -> int:
-    _say(f"{PROGRAM}: {word}")
-    return code
+def _stop(kind: type[Stopped]) -> int:
+    _say(f"{PROGRAM}: {kind.word}")
+    return kind.exit_code
 
 
 def _say(text: str) -> None:
     """Print on standard error; where even that is closed, the exit code has to do."""
     with contextlib.suppress(OSError):
         click.echo(text, err=True)
-
-
-def _raise_terminated(signum: int, frame: FrameType | None) -> None:
-    raise Terminated

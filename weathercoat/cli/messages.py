@@ -49,7 +49,7 @@ class Messages:
                 lines = (
                     error.lines()
                     if isinstance(error, WeathercoatError)
-                    else [f"{type(error).__name__}: {error}"]
+                    else [f"{type(error).__name__}: {error}".removesuffix(": ")]
                 )
                 self._write(*lines)
             self._log.close()

@@ -53,7 +53,7 @@ model_format = click.option(
     metavar="NAME",
     help="Format of the model, where its content and extension do not tell.",
 )
-quiet = click.option("-q", "--quiet", is_flag=True, help="No progress, no messages but errors.")
+quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")
 strict = click.option("--strict", is_flag=True, help="Refuse a model that needs any repair.")

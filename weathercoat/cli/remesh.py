@@ -8,11 +8,13 @@ from pathlib import Path
 import click
 
 from weathercoat.cli import options
+from weathercoat.cli.writing import STANDARD_OUTPUT, WHERE, open_mesh, say_written
+from weathercoat.errors import UsageError
 
 
 @click.command()
 @options.model
-@options.output("File, in the format of its extension.", required=True)
+@options.output(WHERE, required=True)
 @click.option(
     "--faces", type=click.IntRange(4, 20_000_000), default=10_000, show_default=True, help="Wanted faces."
 )
@@ -42,21 +44,31 @@ def command(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Remesh MODEL into even triangles without a direction, keeping creases and boundaries."""
+    """Remesh MODEL into even triangles without a direction, keeping creases and boundaries.
+
+    The result is turned so that up is where the format of the file has it: +y in OBJ and GLB, +z in PLY, STL
+    and OFF.
+    """
+    from weathercoat.cli.messages import Messages
     from weathercoat.cli.reading import read_model
     from weathercoat.mesh.remesh import RemeshParameters, remesh
-    from weathercoat.output.folder import whole_file
-    from weathercoat.output.meshes import write_mesh
     from weathercoat.output.report import measure_surface
+    from weathercoat.run import announce_compiling, name_errors, report_notes
 
-    with whole_file(output, overwrite=overwrite) as stream:
+    if as_json and output == STANDARD_OUTPUT:
+        raise UsageError("--json and -o - both write to standard output", remedy="give a file to -o")
+    with (
+        Messages(quiet=quiet or as_json) as messages,
+        open_mesh(output, overwrite=overwrite) as write,
+        name_errors(model),
+    ):
+        announce_compiling(messages.log)
         surface = read_model(model, model_format)
-        if not quiet and not as_json:
-            for note in surface.notes:
-                click.echo(f"weathercoat: {model}: {note.code}({note.count}): {note.message}", err=True)
+        report_notes(surface.notes, model, messages.log)
         result = remesh(surface, RemeshParameters(faces=faces, crease_angle=crease_angle, seed=seed))
-        write_mesh(stream, result, format=output.suffix)
+        report_notes(result.notes[len(surface.notes) :], model, messages.log)
+        written = write(result)
     if as_json:
-        click.echo(json.dumps(measure_surface(result), indent=2, ensure_ascii=False))
-    else:
-        click.echo(f"written to {output}: {len(result.faces):,} faces, {len(result.vertices):,} vertices")
+        click.echo(json.dumps(measure_surface(written), indent=2, ensure_ascii=False))
+    elif not quiet:
+        say_written(output, f"{len(written.faces):,} faces", f"{len(written.vertices):,} vertices")

@@ -12,6 +12,7 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
+from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
     from weathercoat.config.load import Override
@@ -55,6 +56,10 @@ def command(
     from weathercoat.config.load import load_config
     from weathercoat.output.folder import safe_name
 
+    if output == Path("-"):
+        raise UsageError(
+            "the results are a folder, which -o must name", remedy="see `weathercoat run --help`"
+        )
     loaded = load_config(config, [*assignments, *_shortcuts(seed, steps, faces)])
     is_piped = model == "-"
     stem = "model" if is_piped else Path(model).stem
@@ -74,7 +79,7 @@ def command(
         )
     if as_json:
         click.echo(json.dumps(report, indent=2, ensure_ascii=False))
-    else:
+    elif not quiet:
         click.echo("\n".join([*_table(report), f"written to {folder}"]))
 
 

@@ -11,6 +11,7 @@ from typing import Any, get_type_hints
 import click
 
 from weathercoat.cli import options
+from weathercoat.cli.writing import WHERE, open_mesh, say_written
 
 
 class _Shapes(click.Group):
@@ -34,19 +35,14 @@ def command() -> None:
 
 def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
     def write(output: Path | None, size: float | None, overwrite: bool, **arguments: float) -> None:
-        from weathercoat.mesh.read import UP_OF_FORMAT
-        from weathercoat.output.meshes import write_mesh
-
         path = output or Path(f"{name}.obj")
         surface = make(**arguments)
         if size is not None:
             extent = (surface.vertices.max(axis=0) - surface.vertices.min(axis=0)).max()
             surface = replace(surface, vertices=surface.vertices * (size / extent))
-        if UP_OF_FORMAT.get(path.suffix.lower().lstrip(".")) == "z":
-            turned = surface.vertices[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
-            surface = replace(surface, vertices=turned, up=(0.0, 0.0, 1.0))
-        write_mesh(path, surface, overwrite=overwrite)
-        click.echo(f"written to {path}")
+        with open_mesh(path, overwrite=overwrite) as write_surface:
+            write_surface(surface)
+        say_written(path)
 
     annotated = get_type_hints(make, include_extras=True)
     write = options.debug(options.overwrite(write))
@@ -60,5 +56,5 @@ def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
         kind, about = annotated[parameter.name].__origin__, annotated[parameter.name].__metadata__[0]
         flag = f"--{parameter.name.replace('_', '-')}"
         write = click.option(flag, type=kind, default=parameter.default, show_default=True, help=about)(write)
-    write = options.output(f"File, in the format of its extension; {name}.obj by default.")(write)
+    write = options.output(f"{WHERE} Default: {name}.obj.")(write)
     return click.command(name, help=inspect.getdoc(make))(write)
