@@ -24,8 +24,10 @@ from weathercoat.mesh.read import read_stream, read_surface
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output import folder as run_folder
+from weathercoat.output.camera import Camera
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.pictures import (
+    Image,
     PictureParameters,
     contact_sheet,
     frame_camera,
@@ -262,11 +264,12 @@ class _SnapshotRecorder:
         self.untouched = untouched
         self.watch = watch
         self.figures: list[dict[str, Any]] = []
-        self.snapshots: list[Snapshot] = []
-        self.up = (0.0, 1.0, 0.0)
+        self.images: list[Image] = []
+        self.labels: list[str] = []
+        self.camera: Camera | None = None
 
     def record(self, simulation: Simulation) -> None:
-        """Write the snapshot of this moment in every wanted format, and measure it."""
+        """Write the snapshot of this moment in every wanted format, measure and draw it."""
         with self.watch.time("mesh"):
             snapshot = simulation.snapshot()
         with self.watch.time("write"):
@@ -282,8 +285,8 @@ class _SnapshotRecorder:
                 )
             )
         if self.config.output.preview:
-            self.up = simulation.surface.up
-            self.snapshots.append(snapshot)
+            with self.watch.time("pictures"):
+                self._draw(snapshot, simulation.surface.up)
 
     def _write(self, snapshot: Snapshot, simulation: Simulation) -> None:
         stem = run_folder.snapshot_stem(snapshot.step, simulation.steps)
@@ -299,13 +302,15 @@ class _SnapshotRecorder:
                 untouched=self.untouched,
             )
 
-    def write_preview(self, path: Path) -> None:
-        """Draw all snapshots on one sheet, seen by one camera."""
+    def _draw(self, snapshot: Snapshot, up: tuple[float, float, float]) -> None:
         parameters = picture_parameters(self.config)
-        camera = frame_camera(self.snapshots[0], parameters, up=self.up)
-        images = [
-            render_snapshot(snapshot, parameters, up=self.up, untouched=self.untouched, camera=camera)
-            for snapshot in self.snapshots
-        ]
-        labels = [f"age {snapshot.age:g}" for snapshot in self.snapshots]
-        write_png(path, contact_sheet(images, labels))
+        # of the substrate, and so the same for all snapshots
+        self.camera = self.camera or frame_camera(snapshot, parameters, up=up)
+        self.images.append(
+            render_snapshot(snapshot, parameters, up=up, untouched=self.untouched, camera=self.camera)
+        )
+        self.labels.append(f"age {snapshot.age:g}")
+
+    def write_preview(self, path: Path) -> None:
+        """Put the pictures of all snapshots on one sheet."""
+        write_png(path, contact_sheet(self.images, self.labels))
