@@ -256,6 +256,35 @@ def test_a_shape_that_needs_more_faces_says_so() -> None:
     assert [note.code for note in result.notes] == ["W-FACES"]
 
 
+def test_loops_that_touch_at_a_vertex_are_kept() -> None:
+    plate = make_grid(10)
+    centre = plate.vertices[plate.faces].mean(axis=1)
+    x, y = np.floor(5 * centre[:, 0]), np.floor(5 * centre[:, 1])
+    inside = ((x == 1) & (y == 1)) | ((x == 2) & (y == 2))
+    plate = replace(plate, face_group=inside.astype(np.int32), groups=("body", "trim"))
+    result = remesh(plate, RemeshParameters(faces=1000))
+    assert abs(len(result.faces) / 1000 - 1) <= 0.02
+    assert result.face_areas()[result.face_group == 1].sum() == pytest.approx(0.08, abs=1e-9)
+
+
+def test_degenerate_and_folded_faces_of_the_input_are_removed() -> None:
+    random = np.random.default_rng(3)
+    grid = make_grid(40)
+    vertices = grid.vertices.copy()
+    vertices[:, 0] = np.where(
+        np.abs(vertices[:, 0] - 0.5) < 0.04, 0.5 + 1e-5 * vertices[:, 0], vertices[:, 0]
+    )
+    inner = np.all((vertices[:, :2] > 0.2) & (vertices[:, :2] < 0.3), axis=1)
+    vertices[inner, :2] += random.normal(0, 0.03, (int(inner.sum()), 2))
+    tangled = replace(grid, vertices=vertices)
+    assert np.sum(smallest_angles(tangled) < 0.1) > 50
+    assert np.sum(face_normals(vertices, grid.faces)[:, 2] < 0) > 5
+    result = remesh(tangled, RemeshParameters(faces=1000))
+    assert find_topology_defects(result.faces) == []
+    assert np.all(face_normals(result.vertices, result.faces)[:, 2] > 0)
+    assert smallest_angles(result).min() >= 10
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(20, 400))
 @settings(max_examples=15, deadline=None, derandomize=True)
 def test_random_shapes_stay_valid(seed: int, faces: int) -> None:

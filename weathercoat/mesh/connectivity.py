@@ -114,6 +114,33 @@ def compact(mesh: EditableMesh) -> EditableMesh:
     )
 
 
+def drop_faces(mesh: EditableMesh, drop: NDArray[np.bool_]) -> EditableMesh:
+    """The same mesh without the faces where `drop` (m,) is true, which are whole components."""
+    tail, half_edge = mesh.tail.copy(), mesh.half_edge.copy()
+    gone = np.repeat(drop, 3)
+    half_edge[tail[: len(gone)][gone]] = -1
+    tail[: len(gone)][gone] = -1
+    return compact(mesh._replace(tail=tail, half_edge=half_edge))
+
+
+def join_meshes(one: EditableMesh, other: EditableMesh) -> EditableMesh:
+    """Both compact meshes side by side."""
+    vertices, half_edges = len(one.half_edge), len(one.tail)
+    return EditableMesh(
+        position=np.concatenate([one.position, other.position]),
+        chain=np.concatenate([one.chain, other.chain]),
+        arc=np.concatenate([one.arc, other.arc]),
+        half_edge=np.concatenate([one.half_edge, other.half_edge + np.int32(half_edges)]),
+        tail=np.concatenate([one.tail, other.tail + np.int32(vertices)]),
+        twin=np.concatenate(
+            [one.twin, np.where(other.twin < 0, -1, other.twin + half_edges).astype(np.int32)]
+        ),
+        crease=np.concatenate([one.crease, other.crease]),
+        source=np.concatenate([one.source, other.source]),
+        count=one.count + other.count,
+    )
+
+
 @kernel
 def split_edge(h: int, mesh: EditableMesh) -> int:
     r"""Put a new vertex on the edge of h and return it; the caller sets its position, chain and arc.

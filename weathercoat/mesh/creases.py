@@ -173,7 +173,8 @@ def _trace(
     np.cumsum(np.bincount(ends, minlength=vertex_count), out=start[1:])
     around = np.concatenate([features, features])[order].astype(np.int32)
     walk, walk_half_edge, offset = _walk_chains(start, around, tail, head, len(tail))
-    walk, walk_half_edge, offset = _cut_at_turns(vertices, walk, walk_half_edge, offset, edge_length)
+    is_node = np.diff(start) != 2
+    walk, walk_half_edge, offset = _cut_at_turns(vertices, walk, walk_half_edge, offset, is_node, edge_length)
 
     chain_count = len(offset) - 1
     point = vertices[walk]
@@ -250,14 +251,19 @@ def _walk_chains(
 
 
 def _cut_at_turns(
-    vertices: Vectors, walk: Indices, walk_half_edge: Indices, offset: Indices, edge_length: float
+    vertices: Vectors,
+    walk: Indices,
+    walk_half_edge: Indices,
+    offset: Indices,
+    is_node: NDArray[np.bool_],
+    edge_length: float,
 ) -> tuple[Indices, Indices, Indices]:
-    """The same chains cut at their corners, and loops cut at two at least."""
+    """The same chains cut at their corners, and loops cut at two at least; chains end at `is_node` (n,)."""
     new_walk, new_half_edge, new_offset = [], [], [0]
     for c in range(len(offset) - 1):
         line = walk[offset[c] : offset[c + 1]]
         edges = walk_half_edge[offset[c] : offset[c + 1]]
-        cuts, line, edges = _find_cuts(vertices, line, edges, edge_length)
+        cuts, line, edges = _find_cuts(vertices, line, edges, bool(is_node[line[0]]), edge_length)
         for first, last in itertools.pairwise(cuts):
             new_walk.append(line[first : last + 1])
             new_half_edge.append(np.append(edges[first:last], np.int32(-1)))
@@ -268,15 +274,15 @@ def _cut_at_turns(
 
 
 def _find_cuts(
-    vertices: Vectors, line: Indices, edges: Indices, edge_length: float
+    vertices: Vectors, line: Indices, edges: Indices, at_node: bool, edge_length: float
 ) -> tuple[list[int], Indices, Indices]:
-    """Where a chain has its corners, ends included; a loop is turned to begin at one."""
+    """Where a chain has its corners, ends included; a loop without a node is turned to begin at one."""
     last = len(line) - 1
     is_loop = line[0] == line[-1]
     if last == 1:
         return [0, 1], line, edges
     turn, arc = _turning(vertices[line], is_loop, edge_length)
-    if is_loop:
+    if is_loop and not at_node:
         begin = int(np.argmax(turn[:-1]))
         if begin:
             turned = np.concatenate([line[begin:-1], line[: begin + 1]])

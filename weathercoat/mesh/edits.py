@@ -340,6 +340,18 @@ def face_shapes(mesh: EditableMesh) -> Vectors:
 
 
 @kernel
+def smallest_angles(mesh: EditableMesh) -> Vectors:
+    """Smallest angle of each face of a compact mesh [rad], (m,)."""
+    angle = np.full(mesh.count[1], np.pi)
+    for f in range(len(angle)):
+        for i in range(3):
+            a, b, c = mesh.tail[3 * f + i], mesh.tail[3 * f + (i + 1) % 3], mesh.tail[3 * f + (i + 2) % 3]
+            cotangent = _cotangent(mesh.position, a, b, c)
+            angle[f] = min(angle[f], np.arctan2(1.0, cotangent))
+    return angle
+
+
+@kernel
 def valence_excess(mesh: EditableMesh) -> Indices:
     """Edges at each vertex beyond the six of a regular one, four at a boundary; int32 (n,)."""
     excess = np.zeros(len(mesh.half_edge), np.int32)

@@ -13,7 +13,10 @@ _FARTHEST_WALK = 200  # faces
 
 
 class InputSurface:
-    """A triangle mesh with a search tree: vertices (n, 3), faces, normals (m, 3), twin, crease (3 m,)."""
+    """A triangle mesh with a search tree.
+
+    vertices (n, 3); faces, normals (m, 3); component (m,); twin, crease (3 m,).
+    """
 
     def __init__(self, vertices: Vectors, faces: Indices, twin: Indices, crease: Indices) -> None:
         import igl
@@ -23,7 +26,7 @@ class InputSurface:
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         self.normals = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
         self._wide = faces.astype(np.int64)
-        self._component = igl.facet_components(self._wide)[1]
+        self.component = igl.facet_components(self._wide)[1]
         self._tree = igl.AABB()
         self._tree.init(vertices, self._wide)
 
@@ -40,7 +43,7 @@ class InputSurface:
         """
         face, point = self.closest(points)
         facing = np.einsum("ij,ij->i", self.normals[face], normal)
-        wrong = np.flatnonzero((facing < _FACING) | (self._component[face] != self._component[hint]))
+        wrong = np.flatnonzero((facing < _FACING) | (self.component[face] != self.component[hint]))
         for i in wrong:
             face[i] = walk_to(points[i], hint[i], self.vertices, self.faces, self.twin, self.crease, point[i])
         return face, point

@@ -20,11 +20,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from weathercoat.errors import LimitError, Note
-from weathercoat.mesh.connectivity import FREE, EditableMesh, compact, make_editable_mesh, reserve
+from weathercoat.mesh.connectivity import (
+    FREE,
+    EditableMesh,
+    compact,
+    drop_faces,
+    join_meshes,
+    make_editable_mesh,
+    reserve,
+)
 from weathercoat.mesh.creases import Features, find_features, release_chains
-from weathercoat.mesh.edits import collapse_pass, edge_lengths, face_shapes, flip_edges, split_pass
+from weathercoat.mesh.edits import (
+    collapse_pass,
+    edge_lengths,
+    face_shapes,
+    flip_edges,
+    smallest_angles,
+    split_pass,
+)
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.halfedge import make_twins
+from weathercoat.mesh.mending import DEGENERATE, find_bad_faces, mend_pass, release_around
 from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.orientation import balance_directions, find_flat_parts
 from weathercoat.mesh.projection import InputSurface, barycentric_of
@@ -43,7 +59,10 @@ _SPRING = 0.5  # weight of springs against the mean of the neighbours
 _REGULARITY = 0.7  # weight of valences against the Delaunay criterion, see `edits.flip_pass`
 _FINAL_ROUNDS = 2  # of the correction of the number of faces
 _LONGEST = 1.7  # of the target length, for edges that this correction makes
+_PROMISED_ANGLE = np.radians(10.0)
 _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the short crease beside them
+_JOINED = 0.1  # of the target length; corners nearer than this may be joined to be rid of a degenerate face
+_MEND_ROUNDS = 10
 _SHORT_CREASE = 6.0  # target lengths; longer creases are kept in any case
 
 
@@ -83,10 +102,8 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
     bend = float(np.radians(parameters.crease_angle))
     features = find_features(local, ordered.faces, twin, ordered.face_group, bend, edge_length)
     source = InputSurface(local, ordered.faces, twin, features.crease)
-    mesh = make_editable_mesh(
-        local, ordered.faces, features.crease, features.vertex_chain, features.vertex_arc
-    )
-    mesh = _iterate(mesh, features, source, edge_length, parameters)
+    mesh = _iterate(_start(features, source), features, source, edge_length, parameters)
+    mesh, kept = _keep_degenerate_components(mesh, features, source)
     face, barycentric = _find_places(mesh, features, source)
     count = int(mesh.count[1])
     result = replace(
@@ -98,6 +115,19 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
         colors=None,
         place=Place(old_face[face], _turn_back(barycentric, ordered, face, surface, old_face[face])),
     )
+    angles = smallest_angles(mesh)
+    if kept:
+        message = "components are so thin for these edges that they were left as they came"
+        result = result.with_notes(Note("W-KEPT", kept, message))
+    if np.any(angles < _PROMISED_ANGLE):
+        poor = int(np.sum(angles < _PROMISED_ANGLE))
+        result = result.with_notes(
+            Note(
+                "W-ANGLES",
+                poor,
+                "faces have an angle under 10 degrees: creases or rims are closer than edges",
+            )
+        )
     if abs(count - parameters.faces) > 0.02 * parameters.faces:
         message = (
             f"{parameters.faces} faces wanted, {count} made: the shape does not allow fewer or more even ones"
@@ -169,6 +199,7 @@ def _iterate(
         mesh = _split(mesh, features, length * _SPLIT, length * _SPLIT, random)
         mesh = _collapse(mesh, features, source, length, random)
         mesh = _remove_poor_faces(mesh, features, source, length)
+        mesh = _mend(mesh, features, source, edge_length, 2)
         length *= float(np.clip(np.sqrt(mesh.count[1] / parameters.faces), 0.9, 1.1))
         flip_edges(mesh, source.normals, 10, _REGULARITY)
         for _ in range(2):
@@ -179,6 +210,31 @@ def _iterate(
         if number >= parameters.iterations // 2:
             balance_directions(mesh, features, source.normals, parts, edge_length, _REGULARITY, random)
     return _meet_count(mesh, features, source, length, edge_length, parameters.faces)
+
+
+def _start(features: Features, source: InputSurface) -> EditableMesh:
+    """The input with its features, to be edited."""
+    return make_editable_mesh(
+        source.vertices, source.faces, features.crease, features.vertex_chain, features.vertex_arc
+    )
+
+
+def _keep_degenerate_components(
+    mesh: EditableMesh, features: Features, source: InputSurface
+) -> tuple[EditableMesh, int]:
+    """Components in which degenerate faces are left become what they were, if they had none; how many."""
+    component = source.component[mesh.source]
+    worst, worst_before = (np.ones(source.component.max() + 1) for _ in range(2))
+    np.minimum.at(worst, component, face_shapes(mesh))
+    if worst.min() >= DEGENERATE:
+        return mesh, 0
+    untouched = _start(features, source)
+    np.minimum.at(worst_before, source.component, face_shapes(untouched))
+    kept = (worst < DEGENERATE) & (worst_before >= DEGENERATE)
+    if not kept.any():
+        return mesh, 0
+    mesh = join_meshes(drop_faces(mesh, kept[component]), drop_faces(untouched, ~kept[source.component]))
+    return mesh, int(kept.sum())
 
 
 def _shuffle(
@@ -249,7 +305,7 @@ def _meet_count(
         for _ in range(2):
             flip_edges(mesh, source.normals, 5, _REGULARITY)
             _relax(mesh, features, source, edge_length)
-    return compact(mesh)
+    return _mend(compact(mesh), features, source, edge_length, _MEND_ROUNDS)
 
 
 def _remove_poor_faces(
@@ -264,6 +320,21 @@ def _remove_poor_faces(
     chosen = np.unique(shortest).astype(np.int32)
     collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
     return compact(mesh)
+
+
+def _mend(
+    mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float, rounds: int
+) -> EditableMesh:
+    """Remove degenerate and folded faces; after two rounds creases that hold them are given up."""
+    for number in range(rounds):
+        bad = np.flatnonzero(find_bad_faces(mesh, fan_normals(mesh))).astype(np.int32)
+        if len(bad) == 0:
+            break
+        if number >= 2 and len(features.first):
+            release_around(mesh, features, bad)
+        mend_pass(bad, (_JOINED if number < 5 else 5 * _JOINED) * edge_length, mesh)
+        mesh = compact(mesh)
+    return mesh
 
 
 def _relax(mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float) -> None:
