@@ -9,7 +9,7 @@ angle of a triangle, median and worst [degrees] psi               largest |psi_2
 flat parts of 1,000 faces or more line              distance of the new creases above 30 degrees and
 boundaries from those of the input / diagonal in>out, out>in    largest distance of sampled points of either
 surface from the other / diagonal defects           flipped, degenerate, non-manifold faces; euler: the
-change of the Euler number s                 seconds of a second call
+change of the Euler number s                 CPU seconds of a second call
 """
 
 from __future__ import annotations

@@ -300,7 +300,7 @@ def _cotangent(p: Vectors, apex: int, a: int, b: int) -> float:
 
 
 @kernel
-def _may_flip(h: int, mesh: EditableMesh, normals: Vectors) -> bool:
+def may_flip(h: int, mesh: EditableMesh, normals: Vectors) -> bool:
     """Whether flipping the inner edge of h keeps the mesh a manifold and turns no face over."""
     g = mesh.twin[h]
     a, b, c, d = mesh.tail[h], mesh.tail[g], mesh.tail[prev_of(h)], mesh.tail[prev_of(g)]
@@ -381,7 +381,7 @@ def flip_pass(mesh: EditableMesh, normals: Vectors, excess: Indices, regularity:
             if mesh.chain[v] >= FREE:
                 gain -= 2 * change * excess[v] + 1
         cotangents = _cotangent(p, c, a, b) + _cotangent(p, d, b, a)
-        if cotangents < 0.5 * regularity * gain - 1e-9 and _may_flip(h, mesh, normals):
+        if cotangents < 0.5 * regularity * gain - 1e-9 and may_flip(h, mesh, normals):
             flip_edge(h, mesh)
             excess[a] -= 1
             excess[b] -= 1

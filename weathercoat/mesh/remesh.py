@@ -38,6 +38,7 @@ from weathercoat.mesh.edits import (
     smallest_angles,
     split_pass,
 )
+from weathercoat.mesh.fitting import distances_to, flip_nearer, sample_bends, snap_pass
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.halfedge import make_twins
 from weathercoat.mesh.mending import DEGENERATE, find_bad_faces, mend_pass, release_around
@@ -63,6 +64,11 @@ _PROMISED_ANGLE = np.radians(10.0)
 _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the short crease beside them
 _JOINED = 0.1  # of the target length; corners nearer than this may be joined to be rid of a degenerate face
 _MEND_ROUNDS = 10
+_FIT_ROUNDS = 5
+_FLIP_SHARE = 1.0  # of that tolerance, from which edges are flipped nearer
+_FIT_SHARE = 0.01  # of the vertices at most, since each that is held costs evenness
+_FIT_TOLERANCE = 1.7e-3  # of the diagonal
+_HELD = np.iinfo(np.int32).min  # chain of a free vertex that smoothing shall leave where it is, like a corner
 _SHORT_CREASE = 6.0  # target lengths; longer creases are kept in any case
 
 
@@ -305,7 +311,9 @@ def _meet_count(
         for _ in range(2):
             flip_edges(mesh, source.normals, 5, _REGULARITY)
             _relax(mesh, features, source, edge_length)
-    return _mend(compact(mesh), features, source, edge_length, _MEND_ROUNDS)
+    mesh = _mend(compact(mesh), features, source, edge_length, _MEND_ROUNDS)
+    _fit(mesh, features, source, edge_length)
+    return mesh
 
 
 def _remove_poor_faces(
@@ -320,6 +328,32 @@ def _remove_poor_faces(
     chosen = np.unique(shortest).astype(np.int32)
     collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
     return compact(mesh)
+
+
+def _fit(mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float) -> None:
+    """Bring vertices to tips and ridges that the mesh misses, and smooth about them."""
+    used = source.vertices[np.unique(source.faces)]
+    tolerance = _FIT_TOLERANCE * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    points, below = sample_bends(source, edge_length)
+    held = np.zeros(len(mesh.half_edge), np.bool_)
+    for number in range(_FIT_ROUNDS):
+        distance, near = distances_to(mesh, points)
+        if number == 0:
+            watched = distance > 0.5 * tolerance
+            points, below, distance, near = (x[watched] for x in (points, below, distance, near))
+        far = np.flatnonzero(distance > tolerance)
+        room = int(_FIT_SHARE * len(held)) - int(held.sum())
+        far = far[np.argsort(-distance[far], kind="stable")][: max(room, 0)]
+        if len(far) == 0:
+            break
+        snap_pass(points[far], below[far], near[far], held, mesh, source.normals)
+        flip_nearer(mesh, source, _FLIP_SHARE * tolerance)
+        if number < _FIT_ROUNDS - 2:
+            chain = mesh.chain.copy()
+            mesh.chain[held & (chain == FREE)] = _HELD
+            _relax(mesh, features, source, edge_length)
+            mesh.chain[:] = chain
+    flip_nearer(mesh, source, _FLIP_SHARE * tolerance)
 
 
 def _mend(
