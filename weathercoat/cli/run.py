@@ -57,9 +57,7 @@ def command(
     from weathercoat.output.folder import safe_name
 
     if output == Path("-"):
-        raise UsageError(
-            "the results are a folder, which -o must name", remedy="see `weathercoat run --help`"
-        )
+        raise UsageError("the results are a folder, not a stream", remedy="name the folder with -o")
     loaded = load_config(config, [*assignments, *_shortcuts(seed, steps, faces)])
     is_piped = model == "-"
     stem = "model" if is_piped else Path(model).stem
