@@ -340,7 +340,8 @@ def _fit(mesh: EditableMesh, features: Features, source: InputSurface, edge_leng
         distance, near = distances_to(mesh, points)
         if number == 0:
             watched = distance > 0.5 * tolerance
-            points, below, distance, near = (x[watched] for x in (points, below, distance, near))
+            points, distance = points[watched], distance[watched]
+            below, near = below[watched], near[watched]
         far = np.flatnonzero(distance > tolerance)
         room = int(_FIT_SHARE * len(held)) - int(held.sum())
         far = far[np.argsort(-distance[far], kind="stable")][: max(room, 0)]
