@@ -65,6 +65,7 @@ _POOR = 0.35  # triangles worse than this (1 is equilateral) are not worth the s
 _JOINED = 0.1  # of the target length; corners nearer than this may be joined to be rid of a degenerate face
 _MEND_ROUNDS = 10
 _FIT_ROUNDS = 5
+_FIT_LENGTH = 0.08  # of the target length; meshes for which this is more than the tolerance are not fitted
 _FLIP_SHARE = 1.0  # of that tolerance, from which edges are flipped nearer
 _FIT_SHARE = 0.01  # of the vertices at most, since each that is held costs evenness
 _FIT_TOLERANCE = 1.7e-3  # of the diagonal
@@ -333,7 +334,10 @@ def _remove_poor_faces(
 def _fit(mesh: EditableMesh, features: Features, source: InputSurface, edge_length: float) -> None:
     """Bring vertices to tips and ridges that the mesh misses, and smooth about them."""
     used = source.vertices[np.unique(source.faces)]
-    tolerance = _FIT_TOLERANCE * float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    diagonal = float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+    if _FIT_LENGTH * edge_length > _FIT_TOLERANCE * diagonal:
+        return  # so coarse a mesh misses most bends, and following them would only make it uneven
+    tolerance = _FIT_TOLERANCE * diagonal
     points, below = sample_bends(source, edge_length)
     held = np.zeros(len(mesh.half_edge), np.bool_)
     for number in range(_FIT_ROUNDS):
