@@ -12,6 +12,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 
@@ -22,12 +23,26 @@ def cache_folder() -> Path:
     for source in sorted(package.rglob("*.py")):
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())
-    base = os.environ.get("XDG_CACHE_HOME") or (Path.home() / ".cache")
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 (without a home too)
     return Path(base) / "weathercoat" / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def is_writable(folder: Path) -> bool:
+    """Whether compiled kernels can be kept in `folder`, which is made where it does not exist."""
+    if folder.parts[:1] == ("~",):  # there is no home
+        return False
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
 
 
 if "NUMBA_CACHE_DIR" not in os.environ:
     os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
+# Numba refuses to declare a function whose cache has no place; without one, each run compiles anew.
+_CAN_CACHE = is_writable(Path(os.environ["NUMBA_CACHE_DIR"]))
 
 import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
 
@@ -41,5 +56,5 @@ def is_cold() -> bool:
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` at its first call: cached on disk, IEEE arithmetic, no check for zero divisors."""
-    return numba.njit(cache=True, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+    """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors."""
+    return numba.njit(cache=_CAN_CACHE, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]

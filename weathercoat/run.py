@@ -178,9 +178,15 @@ def _remeshed(painted: Surface, config: Config) -> Surface:
 def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | None]:
     """The faces that carry paint, and the others, or None; by the names of material groups or objects.
 
-    Raises NoFacesError where nothing is left to paint.
+    Names that fit no group are noted. Raises NoFacesError where nothing is left to paint.
     """
     only, excluded = config.paint.only, config.paint.excluded
+    idle = [name for name in (*only, *excluded) if not fnmatch.filter(surface.groups, name)]
+    if idle:
+        what = (
+            f"names of paint.only and paint.except fit none of {', '.join(surface.groups)}: {', '.join(idle)}"
+        )
+        surface = surface.with_notes(Note("W-GROUP", len(idle), what))
 
     def is_painted(group: str) -> bool:
         wanted = not only or any(fnmatch.fnmatchcase(group, pattern) for pattern in only)

@@ -93,6 +93,10 @@ WARNINGS = {
         "The file has animations, which are not kept.",
         "Nothing; export the wanted pose if it matters.",
     ),
+    "W-ANGLES": (
+        "Remeshed faces have an angle under 10 degrees: creases or rims are closer than edges.",
+        "Ask for more faces, or raise `remesh.crease_angle`.",
+    ),
     "W-BADINDEX": (
         "Faces with an index that the format does not allow (0 in OBJ, negative in PLY) were dropped.",
         "Export again if parts are missing.",
@@ -113,7 +117,15 @@ WARNINGS = {
         "The content is of another format than the extension says; the content decided.",
         "Rename the file.",
     ),
+    "W-GROUP": (
+        "Names of `paint.only` or `paint.except` fit no material group or object.",
+        "Compare them with the groups that `weathercoat inspect` lists.",
+    ),
     "W-INVERTED": ("Closed pieces that were inside out were turned.", "Nothing."),
+    "W-KEPT": (
+        "Pieces too small for the wanted edge length kept their own triangles.",
+        "Nothing; ask for more faces if they matter.",
+    ),
     "W-MATERIAL": (
         "A material library or a picture is not beside the model.",
         "Put it there if `paint.only` or `paint.except` need the names of materials.",

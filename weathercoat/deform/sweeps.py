@@ -69,7 +69,7 @@ class Constraints:
 
 
 def interleave(count: int) -> Indices:
-    """The numbers below `count`, tile after tile, each in strides: 0, s, 2 s, ..., 1, s + 1, ..., up to a tile.
+    """The numbers below `count`, tile after tile, each in strides: 0, s, 2 s, ..., 1, s + 1, ...
 
     A tile is small enough for the processor's first cache.
     """
@@ -263,13 +263,14 @@ def measure_residual(
         return Residual(0.0, 0.0, 0.0, 0.0)
     ends = mesh.positions[constraints.length_ends]
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    strain = np.abs(length / constraints.length_targets - 1.0)
+    has_length = constraints.length_targets > 0.0
+    strain = np.abs(length[has_length] / constraints.length_targets[has_length] - 1.0)
     bends = np.empty(len(constraints.hinge_edges))
     _bends_of(mesh, constraints.hinge_edges, bends)
     error = np.abs(bends - bend_targets(constraints, parameters, age))
     return Residual(
-        float(np.sqrt(np.mean(strain**2))),
-        float(strain.max()),
+        float(np.sqrt(np.mean(strain**2))) if len(strain) else 0.0,
+        float(strain.max(initial=0.0)),
         float(np.sqrt(np.mean(error**2))),
         float(error.max()),
     )
