@@ -310,8 +310,8 @@ class _SnapshotRecorder:
 
     def _draw(self, snapshot: Snapshot, up: tuple[float, float, float]) -> None:
         parameters = picture_parameters(self.config)
-        # of the substrate, and so the same for all snapshots
-        self.camera = self.camera or frame_camera(snapshot, parameters, up=up)
+        # of what does not move, and so the same for all snapshots
+        self.camera = self.camera or frame_camera(snapshot, parameters, up=up, untouched=self.untouched)
         self.images.append(
             render_snapshot(snapshot, parameters, up=up, untouched=self.untouched, camera=self.camera)
         )

@@ -165,6 +165,17 @@ def test_the_camera_of_a_run_does_not_depend_on_the_film() -> None:
     assert np.array_equal(first.position, last.position) and np.array_equal(first.forward, last.forward)
 
 
+def test_the_camera_sees_the_untouched_parts_too() -> None:
+    """A part far to the right of the plate moves the camera back, and its picture has that part in it."""
+    snapshot = plate(0.0)
+    part = make_surface(np.add(snapshot.substrate_vertices, [4.0, 0.0, 0.0]), snapshot.substrate_faces)
+    near, far = frame_camera(snapshot, SMALL), frame_camera(snapshot, SMALL, untouched=part)
+    assert np.linalg.norm(far.position) > 1.5 * np.linalg.norm(near.position)
+    picture = render_snapshot(snapshot, replace(SMALL, unpainted=(0.9, 0.05, 0.05)), untouched=part)
+    red = (picture[:, :, 0] > 2.0 * picture[:, :, 1].astype(float)).any(axis=0)
+    assert red.any() and not red[:2].any() and not red[-2:].any()
+
+
 def test_intact_paint_has_the_hue_of_the_paint() -> None:
     green = middle(render_snapshot(plate(0.0), replace(SMALL, paint=(0.2, 0.6, 0.25))))
     red = middle(render_snapshot(plate(0.0), replace(SMALL, paint=(0.7, 0.15, 0.1))))

@@ -95,7 +95,8 @@ RULES = {
     "literal": (LITERAL_FILM, LITERAL_CURL),
     "linear tension": ({"tension_law": "linear"}, {}),
     "plain sum": ({"lift_sum": "plain"}, {}),
-    "lift by the face's tension": ({"lift_tension": "face"}, {}),
+    # what cracks have relaxed lifts less, so the film needs more lift to fail as much
+    "lift by the face's tension": ({"lift_tension": "face", "lift_coefficient": 0.6}, {}),
     "relaxed faces": ({"fracture_relaxation": "faces"}, {}),
     "one round": ({"fracture_rounds": "one"}, {}),
     "single faces fall": ({"flaking_rule": "faces"}, {}),

@@ -62,7 +62,7 @@ def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
     up = (x, y, z)
     untouched = run / "untouched.ply"
     unpainted = read_surface(untouched) if untouched.exists() else None
-    camera = frame_camera(snapshots[0], parameters, up=up)
+    camera = frame_camera(snapshots[0], parameters, up=up, untouched=unpainted)
     images = [
         render_snapshot(snapshot, parameters, up=up, untouched=unpainted, camera=camera)
         for snapshot in snapshots

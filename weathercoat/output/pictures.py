@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.errors import OutputError
-from weathercoat.mesh.surface import Surface, Vectors
+from weathercoat.mesh.surface import Surface, Vectors, vertex_normals
 from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
 from weathercoat.output.ground import ground_shadow
@@ -83,12 +83,23 @@ _SAME_SURFACE = 0.004  # distance from a plane, in sizes, within which samples c
 _STAIN_DEPTH = np.array([0.35, 1.1, 2.2])  # a stain takes away blue first
 
 
-def frame_camera(snapshot: Snapshot, parameters: PictureParameters, *, up: Axis = _Y_UP) -> Camera:
-    """The camera, in display units, that frames a snapshot's substrate: the same for all of a run."""
-    vertices = Normalisation.of(snapshot)(snapshot.substrate_vertices)
+def frame_camera(
+    snapshot: Snapshot,
+    parameters: PictureParameters,
+    *,
+    up: Axis = _Y_UP,
+    untouched: Surface | None = None,
+) -> Camera:
+    """The camera, in display units, that frames the substrate and the untouched parts: the same for all of a
+    run.
+    """
+    vertices, normals = snapshot.substrate_vertices, snapshot.substrate_normals
+    if untouched is not None:
+        vertices = np.concatenate([vertices, untouched.vertices])
+        normals = np.concatenate([normals, vertex_normals(untouched.vertices, untouched.faces)])
     return make_camera(
-        vertices,
-        snapshot.substrate_normals,
+        Normalisation.of(snapshot)(vertices),
+        normals,
         up,
         aspect=parameters.width / parameters.height,
         azimuth=parameters.azimuth,
@@ -110,7 +121,7 @@ def render_snapshot(
     up: unit vector against gravity, in the model's axes; untouched: parts of the model that carry no paint,
     in its units; camera: one of `frame_camera`, which is also the default.
     """
-    camera = camera or frame_camera(snapshot, parameters, up=up)
+    camera = camera or frame_camera(snapshot, parameters, up=up, untouched=untouched)
     normalise = Normalisation.of(snapshot)
     mesh = make_display_mesh(
         snapshot,
