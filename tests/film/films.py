@@ -9,7 +9,7 @@ import numpy as np
 from tests.zoo import find_edge, find_half_edge, make_mesh
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
-from weathercoat.film.lift import disturb
+from weathercoat.film.lift import disturb, lift_on
 from weathercoat.film.start import make_film_state
 from weathercoat.film.state import (
     FilmParameters,
@@ -101,6 +101,19 @@ class Film:
         """The film vertices in use that stem from a rest vertex."""
         used = np.unique(self.mesh.tail[np.repeat(self.mesh.alive, 3)])
         return [int(v) for v in used if self.mesh.origin[v] == origin]
+
+
+def sum_lift(film: Film, convexity: float, face_tension: Vectors, per_valence: bool) -> Vectors:
+    """The lift sum of each vertex worked out anew, 0 where it has separated; `find_overcome` shortens it."""
+    mesh, state = film.mesh, film.state
+    out = np.zeros(mesh.vertex_count)
+    for v in range(mesh.vertex_count):
+        if not state.separated[v] and mesh.half_edge[v] >= 0:
+            out[v] = lift_on(
+                mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, state.separated, state.lift_factor,
+                convexity, face_tension, per_valence,
+            )  # fmt: skip
+    return out
 
 
 def make_film(surface: Surface, *, attached: tuple[int, ...] = (), seed: int = 1, **changes: object) -> Film:

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 
 from tests import zoo
-from tests.film.films import Film, make_film
-from weathercoat.film.lift import sum_lift
+from tests.film.films import Film, make_film, sum_lift
 from weathercoat.mesh.surface import Surface, Vectors
 
 
 def lift_of(film: Film, tension: float | Vectors = 1.0, per_valence: bool = False) -> Vectors:
-    count = film.mesh.vertex_count
-    out = np.full(count, np.nan)
     face_tension = np.broadcast_to(np.asarray(tension, float), len(film.mesh.alive)).copy()
-    convexity = film.parameters.lift_convexity
-    sum_lift(film.mesh, film.state, convexity, face_tension, per_valence, out, np.empty(count, np.int32))
-    return out
+    return sum_lift(film, film.parameters.lift_convexity, face_tension, per_valence)
 
 
 def attached_film(surface: Surface, **changes: object) -> Film:

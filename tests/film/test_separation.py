@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests import zoo
-from tests.film.films import Film, make_film
-from weathercoat.film.lift import sum_lift
+from tests.film.films import Film, make_film, sum_lift
 from weathercoat.film.separation import find_separating, separate
 from weathercoat.film.state import evaluate_tension
 from weathercoat.mesh.shapes import make_sphere
@@ -138,8 +137,7 @@ def test_finds_whom_a_plain_evaluation_finds_while_the_film_moves(rule: str, sum
         tension = film.state.tension_now
         if rule == "drying":
             tension = np.full(len(tension), 1 - math.exp(-3 * age))
-        total = np.empty(count)
-        sum_lift(film.mesh, film.state, 2.0, tension, sums == "per_valence", total, np.empty(count, np.int32))
+        total = sum_lift(film, 2.0, tension, sums == "per_valence")
         adhesion = np.maximum(film.state.adhesion - 0.5 * age, 0.0)[film.mesh.origin[:count]]
         margin = 0.3 * total - adhesion
         margin[film.state.separated[:count]] = -1.0

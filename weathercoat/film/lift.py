@@ -51,8 +51,8 @@ def lift_on(
     convexity: float,
     face_tension: Vectors,
     per_valence: bool,
-) -> tuple[float, int]:
-    """Sum of tension times lift factor over the half-edges opposite to an attached vertex, and their number.
+) -> float:
+    """Sum of tension times lift factor over the half-edges opposite to an attached vertex.
 
     first: the half-edge at which the vertex's fan begins.
     per_valence scales the sum to six half-edges, so that valence and rim do not matter.
@@ -71,7 +71,7 @@ def lift_on(
             break
     if per_valence and count > 0:
         total *= 6.0 / count
-    return total, count
+    return total
 
 
 @kernel
@@ -80,7 +80,7 @@ def sum_rest_lift(mesh: HalfEdgeMesh, rest_factor: Vectors, per_valence: bool, o
     attached = np.zeros(len(out), np.bool_)
     ones = np.ones(len(mesh.alive))
     for v in range(len(out)):
-        out[v], _ = lift_on(
+        out[v] = lift_on(
             mesh.half_edge[v],
             mesh.positions,
             mesh.tail,
@@ -91,31 +91,6 @@ def sum_rest_lift(mesh: HalfEdgeMesh, rest_factor: Vectors, per_valence: bool, o
             ones,
             per_valence,
         )
-
-
-@kernel
-def sum_lift(
-    mesh: HalfEdgeMesh,
-    state: FilmState,
-    convexity: float,
-    face_tension: Vectors,
-    per_valence: bool,
-    out: Vectors,
-    opposite_count: Indices,
-) -> None:
-    """Sum over the half-edges opposite to each attached vertex of tension times lift factor, into out (n,).
-
-    face_tension: (m,), the tension that lifts; opposite_count (n,): the number of those half-edges. Both are
-    0 for vertices that have separated. The lift itself is k times the result.
-    """
-    out[:] = 0.0
-    opposite_count[:] = 0
-    for v in range(len(out)):
-        if not state.separated[v] and mesh.half_edge[v] >= 0:
-            out[v], opposite_count[v] = lift_on(
-                mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, state.separated, state.lift_factor,
-                convexity, face_tension, per_valence,
-            )  # fmt: skip
 
 
 @kernel
@@ -153,7 +128,7 @@ def find_overcome(
         if is_uniform and not disturbed[v]:
             total = rest_lift[v]
         else:
-            total, _ = lift_on(
+            total = lift_on(
                 half_edge[v],
                 positions,
                 tail,

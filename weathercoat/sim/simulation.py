@@ -56,7 +56,6 @@ class Simulation:
     constraints: Constraints
     rust: RustState
     dust_exposure: Vectors
-    initial_twin: Indices
     film_parameters: FilmParameters
     deform_parameters: DeformParameters
     stain_parameters: StainParameters
@@ -186,7 +185,6 @@ def make_simulation(
         constraints=make_constraints(mesh),
         rust=make_rust_state(mesh),
         dust_exposure=dust_exposure(mesh, _UP),
-        initial_twin=mesh.twin.copy(),
         film_parameters=film,
         deform_parameters=deform or DeformParameters(),
         stain_parameters=stain or StainParameters(),
