@@ -1,30 +1,58 @@
 """`kernel`: how every compiled function of the package is declared, and where its machine code is kept.
 
-Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the cache
-folder is keyed by a hash of the package's sources; Numba itself keys by CPU. The folder lies in the user's
-cache directory, so that a package which is installed read-only caches as well; `NUMBA_CACHE_DIR` overrides
-it.
+Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the kernels
+of each module are kept in a folder keyed by a hash of the sources that the module is made from: its own and
+those of all modules of the package that it imports, directly or not. Numba itself keys by CPU. The folders lie
+in the user's cache directory, so that a package which is installed read-only caches as well;
+`NUMBA_CACHE_DIR` names another place.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+_PACKAGE = Path(__file__).parent
+_IMPORT = re.compile(rb"^\s*(?:from|import) weathercoat\.([\w.]+)", re.MULTILINE)
+
 
 def cache_folder() -> Path:
-    """The folder for compiled kernels: one for each state of the package's sources."""
-    package = Path(__file__).parent
-    digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
+    """The folder that holds the folders of all modules' kernels."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return Path(given)
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 (without a home too)
-    return Path(base) / "weathercoat" / f"kernels-{digest.hexdigest()[:16]}"
+    return Path(base) / "weathercoat" / "kernels"
+
+
+@cache
+def _source(module: str) -> bytes:
+    """The source of a module of the package by its name below the package; empty where there is none."""
+    path = _PACKAGE / (module.replace(".", "/") + ".py")
+    return path.read_bytes() if path.is_file() else b""
+
+
+@cache
+def kernel_folder(module: str) -> Path:
+    """The folder for the kernels of a module, by its name below the package: `film.lift`."""
+    made_from = {module}
+    unread = [module]
+    while unread:
+        for found in _IMPORT.findall(_source(unread.pop())):
+            name = found.decode()
+            if name not in made_from:
+                made_from.add(name)
+                unread.append(name)
+    digest = hashlib.sha256()
+    for name in sorted(made_from):
+        digest.update(name.encode() + b"\0" + _source(name) + b"\0")
+    return cache_folder() / f"{module}-{digest.hexdigest()[:16]}"
 
 
 def is_writable(folder: Path) -> bool:
@@ -39,22 +67,20 @@ def is_writable(folder: Path) -> bool:
         return False
 
 
-if "NUMBA_CACHE_DIR" not in os.environ:
-    os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
 # Numba refuses to declare a function whose cache has no place; without one, each run compiles anew.
-_CAN_CACHE = is_writable(Path(os.environ["NUMBA_CACHE_DIR"]))
+_CAN_CACHE = is_writable(cache_folder())
 
-import numba  # noqa: E402  (reads NUMBA_CACHE_DIR when it is imported)
+import numba  # noqa: E402  (after the environment was read)
 
 
 def is_cold() -> bool:
-    """Whether no kernel of this state of the package has been compiled yet, so that the next run takes
-    longer.
-    """
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    return next(folder.rglob("*.nbi"), None) is None
+    """Whether no kernel has been kept yet, so that the next run takes longer."""
+    return next(cache_folder().rglob("*.nbi"), None) is None
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors."""
-    return numba.njit(cache=_CAN_CACHE, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+    package, _, module = function.__module__.partition(".")
+    numba.config.CACHE_DIR = str(kernel_folder(module))
+    can_cache = _CAN_CACHE and package == __name__.partition(".")[0]
+    return numba.njit(cache=can_cache, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
