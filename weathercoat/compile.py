@@ -2,8 +2,8 @@
 
 Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the kernels
 of each module are kept in a folder keyed by a hash of the sources that the module is made from: its own and
-those of all modules of the package that it imports, directly or not. Numba itself keys by CPU. The folders lie
-in the user's cache directory, so that a package which is installed read-only caches as well;
+those of all modules of the package that it imports, directly or not. Numba itself keys by CPU. The folders
+lie in the user's cache directory, so that a package which is installed read-only caches as well;
 `NUMBA_CACHE_DIR` names another place.
 """
 
@@ -81,6 +81,6 @@ def is_cold() -> bool:
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors."""
     package, _, module = function.__module__.partition(".")
-    numba.config.CACHE_DIR = str(kernel_folder(module))
+    numba.config.CACHE_DIR = str(kernel_folder(module))  # type: ignore[attr-defined]
     can_cache = _CAN_CACHE and package == __name__.partition(".")[0]
     return numba.njit(cache=can_cache, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
