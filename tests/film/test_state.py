@@ -7,7 +7,7 @@ import pytest
 
 from tests import zoo
 from tests.film.films import STEADY, make_film
-from weathercoat.film.start import make_film_state
+from weathercoat.film.start import FilmLayout, lift_at_rest, make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmState,
@@ -37,6 +37,20 @@ def test_the_film_begins_attached_and_whole() -> None:
         and (state.tension_cap == 1.0).all()
     )
     assert (state.adhesion == 1.0).all() and (state.cohesion == 1000.0).all()
+
+
+def test_the_film_takes_the_layout_that_it_is_given() -> None:
+    adhesion, cohesion = np.linspace(1.0, 2.0, SHEET.vertex_count), np.full(len(SHEET.twin), 7.0)
+    state = make_film_state(SHEET, FilmParameters(**STEADY), 1, FilmLayout(adhesion, cohesion))  # type: ignore[arg-type]
+    assert (state.adhesion == adhesion).all() and (state.cohesion == cohesion).all()
+    without = make_state()
+    assert (state.tie == without.tie).all() and (state.rest_lift == without.rest_lift).all()
+
+
+def test_a_flat_film_at_rest_lifts_by_half_on_each_of_six_sides() -> None:
+    factor, lift = lift_at_rest(SHEET, FilmParameters(lift_sum="per_valence"))
+    assert (factor == 0.5).all()
+    np.testing.assert_allclose(lift, 3.0, rtol=1e-15)
 
 
 def test_adhesion_follows_noise_about_its_base() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from weathercoat.film.lift import sum_rest_lift
@@ -12,12 +14,19 @@ from weathercoat.mesh.halfedge import HalfEdgeMesh
 from weathercoat.mesh.surface import Vectors
 
 
-def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -> FilmState:
-    """The film at age 0: attached, adhesion by noise, cohesion equal but for scatter and a few defects."""
+class FilmLayout(NamedTuple):
+    """What the film holds with at age 0: adhesion (n0,) of the vertices, cohesion (3 m,) of the half-edges,
+    the same for both of a pair.
+    """
+
+    adhesion: Vectors
+    cohesion: Vectors
+
+
+def lay_out_film(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -> FilmLayout:
+    """Adhesion by noise, cohesion equal but for scatter and a few defects."""
     p = parameters
-    face_count = len(mesh.faces)
-    capacity = 3 * face_count
-    midpoint, edge_length, edge_area = _edge_geometry(mesh)
+    midpoint, _, edge_area = _edge_geometry(mesh)
     noise = fractal_noise(
         mesh.rest_positions,
         wavelength=p.adhesion_wavelength,
@@ -29,13 +38,21 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
     cohesion = p.cohesion_base * (1.0 + p.cohesion_scatter * (2.0 * scatter - 1.0))
     share = p.defects_density * edge_area if p.defects_rule == "per_area" else p.defects_share
     cohesion[hash_uniform(midpoint, stream_key(seed, "defects")) < share] *= p.defects_strength
-    bends = np.empty(capacity)
-    all_bends(mesh.positions, mesh.tail, mesh.twin, bends)
-    lift_factor = 1.0 / (1.0 + np.exp(-p.lift_convexity * bends))
-    rest_lift = np.empty(mesh.vertex_count)
-    sum_rest_lift(mesh, lift_factor, p.lift_sum == "per_valence", rest_lift)
+    return FilmLayout(p.adhesion_base + p.adhesion_amplitude * noise, cohesion)
+
+
+def make_film_state(
+    mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int, layout: FilmLayout | None = None
+) -> FilmState:
+    """The film at age 0, attached; its adhesion and cohesion are those of `lay_out_film` unless given."""
+    p = parameters
+    layout = layout or lay_out_film(mesh, p, seed)
+    face_count = len(mesh.faces)
+    capacity = 3 * face_count
+    midpoint, edge_length, _ = _edge_geometry(mesh)
+    lift_factor, rest_lift = lift_at_rest(mesh, p)
     return FilmState(
-        adhesion=p.adhesion_base + p.adhesion_amplitude * noise,
+        adhesion=layout.adhesion,
         separated=np.zeros(capacity, np.bool_),
         separation_age=np.full(capacity, np.inf),
         is_tip=np.zeros(capacity, np.bool_),
@@ -46,7 +63,7 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
         tension_now=np.full(face_count, p.tension_initial),
         relief=np.zeros((face_count, 3)),
         fray_age=np.full(face_count, np.inf),
-        cohesion=cohesion,
+        cohesion=layout.cohesion,
         lift_factor=lift_factor,
         tie=hash_bits(midpoint, stream_key(seed, "ties")),
         crack_budget=np.zeros(1),
@@ -54,6 +71,18 @@ def make_film_state(mesh: HalfEdgeMesh, parameters: FilmParameters, seed: int) -
         rest_lift=rest_lift,
         disturbed=np.zeros(capacity, np.bool_),
     )
+
+
+def lift_at_rest(mesh: HalfEdgeMesh, parameters: FilmParameters) -> tuple[Vectors, Vectors]:
+    """The sigmoid of the dihedral of each half-edge (3 m,), and what lifts each vertex at tension 1 (n0,),
+    before anything has moved.
+    """
+    bends = np.empty(3 * len(mesh.faces))
+    all_bends(mesh.positions, mesh.tail, mesh.twin, bends)
+    lift_factor = 1.0 / (1.0 + np.exp(-parameters.lift_convexity * bends))
+    rest_lift = np.empty(mesh.vertex_count)
+    sum_rest_lift(mesh, lift_factor, parameters.lift_sum == "per_valence", rest_lift)
+    return lift_factor, rest_lift
 
 
 def _edge_geometry(mesh: HalfEdgeMesh) -> tuple[Vectors, Vectors, Vectors]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +21,7 @@ from weathercoat.deform.sweeps import (
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import find_separating, separate
-from weathercoat.film.start import make_film_state
+from weathercoat.film.start import FilmLayout, lay_out_film, make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmState,
@@ -167,11 +168,13 @@ def make_simulation(
     duration: float = 1.0,
     seed: int = 1,
     frame: Frame | None = None,
+    lay_out: Callable[[HalfEdgeMesh, FilmParameters, int], FilmLayout] = lay_out_film,
 ) -> Simulation:
     """A simulation of a manifold, oriented surface, at age 0; `duration` is the age that `steps` steps cover.
 
     `frame` is that of the surface itself unless given; give the input's, where the surface is a remeshed one,
-    so that noise lies alike at every resolution.
+    so that noise lies alike at every resolution. `lay_out` gives the film its adhesion and cohesion from the
+    mesh, the parameters and the seed.
     """
     frame = frame or make_frame(surface)
     ordered, _ = order_surface(surface, frame.localise(surface.vertices))
@@ -181,7 +184,7 @@ def make_simulation(
         surface=ordered,
         frame=frame,
         mesh=mesh,
-        film=make_film_state(mesh, film, seed),
+        film=make_film_state(mesh, film, seed, lay_out(mesh, film, seed)),
         constraints=make_constraints(mesh),
         rust=make_rust_state(mesh),
         dust_exposure=dust_exposure(mesh, _UP),
