@@ -34,9 +34,11 @@ from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, make_event_log, ma
 from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.surface import Indices, Surface, Vectors
 from weathercoat.sim.snapshot import Snapshot
+from weathercoat.stain import runoff as runoff_room
 from weathercoat.stain import rust as rust_room
 from weathercoat.stain.color import Palette, stain_color
 from weathercoat.stain.dust import dust_at, dust_exposure
+from weathercoat.stain.runoff import Runoff, make_runoff
 from weathercoat.stain.rust import RustState, StainParameters, make_rust_state, metal_rust_at
 
 _UP = np.array([0.0, 0.0, 1.0])  # in the simulation's frame
@@ -69,9 +71,12 @@ class Simulation:
         default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0}
     )
     log: EventLog = field(init=False)
+    runoff: Runoff = field(init=False)
 
     def __post_init__(self) -> None:
         self.log = make_event_log(len(self.mesh.faces))
+        tick = self.duration / self.steps
+        self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP, tick)
 
     @property
     def age(self) -> float:
@@ -106,8 +111,9 @@ class Simulation:
         deform(self.mesh, self.constraints, self.deform_parameters, age)
         deformed = time.perf_counter()
 
-        rust_room.follow_events(self.mesh, self.rust, self.log, _UP, age)
-        rust_room.stain(self.mesh, self.rust, self.stain_parameters, _UP, tick)
+        rust_room.follow_events(self.mesh, self.rust, self.log, age)
+        runoff_room.follow_events(self.mesh, self.rust, self.runoff, self.log)
+        runoff_room.run_off(self.mesh, self.rust, self.runoff)
         self.seconds["failure"] += decided - started
         self.seconds["deformation"] += deformed - decided
         self.seconds["stains"] += time.perf_counter() - deformed
