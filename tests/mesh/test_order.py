@@ -116,3 +116,18 @@ def test_neighbours_lie_near_each_other() -> None:
     ordered = order_in_frame(surface)
     assert median_gap(surface.faces) > 500
     assert median_gap(ordered.faces) < 50
+
+
+def test_the_order_is_that_of_sorting_by_code_and_coordinates() -> None:
+    """Points of one cell of the curve by x, y, z; those at one place as they come."""
+    random = np.random.default_rng(5)
+    points = random.integers(0, 3, (60, 3)) + 1e-9 * random.integers(0, 2, (60, 3))
+    surface = make_surface(points, random.permutation(60).reshape(-1, 3))
+    ordered, old_face = order_surface(surface, points)
+    order = np.lexsort((*points.T[::-1], morton_codes(points)))
+    assert (ordered.vertices == points[order]).all()
+    rank = np.argsort(order)
+    faces = rank[surface.faces]
+    faces = np.array([np.roll(face, -face.argmin()) for face in faces])
+    assert (old_face == np.lexsort(faces.T[::-1])).all()
+    assert (ordered.faces == faces[old_face]).all()

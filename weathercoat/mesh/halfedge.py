@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.pairing import pair_half_edges
 from weathercoat.mesh.surface import Indices, Vectors, vertex_normals
 
 
@@ -134,21 +135,13 @@ def make_twins(faces: Indices) -> Indices:
 
     Raises ValueError where an edge has more than two faces or two that run the same way.
     """
-    start = faces.reshape(-1).astype(np.int64)
-    end = np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
-    key = np.minimum(start, end) * (int(faces.max(initial=0)) + 1) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
-    same = sorted_key[1:] == sorted_key[:-1]
-    if np.any(same[1:] & same[:-1]):
+    faces = np.ascontiguousarray(faces, np.int32)
+    twin, beyond, alike = pair_half_edges(faces, int(faces.max(initial=-1)) + 1)
+    if len(beyond):
         raise ValueError("an edge has more than two faces")
-    first, second = order[:-1][same], order[1:][same]
-    if np.any(start[first] != end[second]):
+    if alike:
         raise ValueError("two faces run along an edge in the same direction")
-    twin = np.full(len(start), -1, np.int32)
-    twin[first] = second
-    twin[second] = first
-    return twin
+    return twin  # type: ignore[no-any-return]
 
 
 @kernel
@@ -244,39 +237,59 @@ def drop_face(mesh: HalfEdgeMesh, log: EventLog, f: int) -> None:
 
 def check_half_edges(mesh: HalfEdgeMesh) -> str:
     """The first invariant that does not hold, in words, or an empty string."""
-    live = np.repeat(mesh.alive, 3)
-    half_edges = np.flatnonzero(live)
-    tail, twin = mesh.tail, mesh.twin
-    head = tail[half_edges - half_edges % 3 + (half_edges % 3 + 1) % 3]
-    paired = twin[half_edges] >= 0
-    inner = half_edges[paired]
-    opposite = twin[inner]
-    if np.any(opposite >= len(twin)) or np.any(tail[half_edges] >= mesh.vertex_count):
-        return "an index is out of range"
-    if np.any(~live[opposite]):
-        return "a live half-edge has a twin that is gone"
-    if np.any(twin[opposite] != inner):
-        return "twin is no involution"
-    if np.any(tail[opposite] != head[paired]):
-        return "twins do not run between the same vertices"
-    used = np.unique(tail[half_edges])
-    start = mesh.half_edge[used]
-    if np.any(start < 0) or np.any(~live[start]) or np.any(tail[start] != used):
-        return "a vertex does not know a half-edge of its own"
-    if int(_count_fans(start, tail, twin)) != len(half_edges):
-        return "a vertex has more than one fan, or its fan does not begin with its first half-edge"
-    return ""
+    return _PROBLEMS[_find_problem(mesh.tail, mesh.twin, mesh.half_edge, mesh.alive, mesh.vertex_count)]
+
+
+_PROBLEMS = (
+    "",
+    "an index is out of range",
+    "a live half-edge has a twin that is gone",
+    "twin is no involution",
+    "twins do not run between the same vertices",
+    "a vertex does not know a half-edge of its own",
+    "a vertex has more than one fan, or its fan does not begin with its first half-edge",
+)
 
 
 @kernel
-def _count_fans(start: Indices, tail: Indices, twin: Indices) -> int:
-    """How many half-edges are met by going counter-clockwise round each vertex from its first one."""
+def _find_problem(
+    tail: Indices, twin: Indices, half_edge: Indices, alive: NDArray[np.bool_], vertex_count: int
+) -> int:
+    """The place in `_PROBLEMS` of the first invariant that does not hold, 0 where all do."""
+    live = 0
+    gone = torn = apart = False
+    for h in range(len(tail)):
+        if alive[h // 3] and (twin[h] >= len(twin) or tail[h] >= vertex_count):
+            return 1
+    for h in range(len(tail)):
+        if not alive[h // 3]:
+            continue
+        live += 1
+        t = twin[h]
+        if t >= 0:
+            gone |= not alive[t // 3]
+            torn |= twin[t] != h
+            apart |= tail[t] != tail[next_of(h)]
+    if gone or torn or apart:
+        return 2 if gone else 3 if torn else 4
+    is_used = np.zeros(vertex_count, np.bool_)
+    for h in range(len(tail)):
+        if not alive[h // 3]:
+            continue
+        v = tail[h]
+        is_used[v] = True
+        first = half_edge[v]
+        if first < 0 or not alive[first // 3] or tail[first] != v:
+            return 5
+    # Every half-edge is met once by going counter-clockwise round each vertex from its first one.
     met = 0
-    for i in range(len(start)):
-        g = start[i]
-        for _ in range(len(tail)):
+    for v in range(vertex_count):
+        if not is_used[v]:
+            continue
+        g = half_edge[v]
+        while met <= live:
             met += 1
             g = twin[prev_of(g)]
-            if g < 0 or g == start[i]:
+            if g < 0 or g == half_edge[v]:
                 break
-    return met
+    return 0 if met == live else 6

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.errors import Note
 from weathercoat.mesh import topology
+from weathercoat.mesh.buckets import order_codes
 from weathercoat.mesh.surface import Surface, face_normals
 from weathercoat.mesh.topology import cross, dot
+from weathercoat.mesh.weld import first_at_place
 
 SHARP_ANGLE = np.radians(30.0)
 MAX_CELLS_PER_FACE = 8
@@ -82,7 +84,7 @@ def inspect_surface(surface: Surface, *, self_intersections: bool = False) -> di
     }
 
 
-def _sharp_share(vertices: NDArray[np.float64], faces: NDArray[np.int32], twin: NDArray[np.int64]) -> float:
+def _sharp_share(vertices: NDArray[np.float64], faces: NDArray[np.int32], twin: NDArray[np.int32]) -> float:
     """Share of the inner edges whose faces meet at more than `SHARP_ANGLE`."""
     inner = np.flatnonzero(twin > np.arange(len(twin)))
     if not len(inner):
@@ -105,7 +107,7 @@ def self_intersecting_faces(vertices: NDArray[np.float64], faces: NDArray[np.int
     low, high = corner.min(axis=1), corner.max(axis=1)
     origin = low.min(axis=0)
     extent = np.maximum(high.max(axis=0) - origin, np.finfo(float).tiny)
-    _, position = np.unique(vertices, axis=0, return_inverse=True)
+    position = first_at_place(vertices, np.zeros(len(vertices), np.int64))
     cell = float(np.mean((high - low).max(axis=1)))
     while True:
         first = np.floor((low - origin) / cell).astype(np.int64)
@@ -118,9 +120,9 @@ def self_intersecting_faces(vertices: NDArray[np.float64], faces: NDArray[np.int
     key = np.empty(int(covered.sum()), np.int64)
     member = np.empty(len(key), np.int64)
     _enter_cells(first, last, shape, key, member)
-    order = np.argsort(key, kind="stable")
+    order = order_codes(key.view(np.uint64))
     hit = np.zeros(len(faces), np.bool_)
-    _test_cells(corner, position.reshape(-1)[faces], low, high, first, key[order], member[order], shape, hit)
+    _test_cells(corner, position[faces], low, high, first, key[order], member[order], shape, hit)
     return hit
 
 

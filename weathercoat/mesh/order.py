@@ -10,6 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from weathercoat.compile import kernel
+from weathercoat.mesh.buckets import order_codes, order_rows
 from weathercoat.mesh.surface import Indices, Place, Surface, Vectors
 
 
@@ -43,23 +45,48 @@ def order_surface(surface: Surface, points: Vectors) -> tuple[Surface, Indices]:
 
     Faces begin with their smallest vertex. Also returned: for each new face the old one, int32 (m,).
     """
-    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0], morton_codes(points)))
+    order = _order_points(points)
     rank = np.empty(len(order), np.int32)
     rank[order] = np.arange(len(order), dtype=np.int32)
-    faces = rank[surface.faces]
-    turn = faces.argmin(axis=1)
-    corner = (turn[:, None] + np.arange(3)) % 3
-    faces = np.take_along_axis(faces, corner, axis=1)
-    uv = None if surface.uv is None else np.take_along_axis(surface.uv, corner[:, :, None], axis=1)
-    face_order = np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))
+    faces, turn = rank[surface.faces], np.empty(len(surface.faces), np.int8)
+    _begin_with_smallest(faces, turn)
+    uv = surface.uv
+    if uv is not None:
+        uv = np.take_along_axis(uv, (turn[:, None, None] + np.arange(3)[:, None]) % 3, axis=1)
+    face_order = order_rows(faces, len(points))
     place = surface.place
     ordered = replace(
         surface,
-        vertices=np.ascontiguousarray(surface.vertices[order]),
-        faces=np.ascontiguousarray(faces[face_order].astype(np.int32)),
+        vertices=surface.vertices[order],
+        faces=faces[face_order],
         face_group=surface.face_group[face_order],
         uv=None if uv is None else uv[face_order],
         colors=None if surface.colors is None else surface.colors[order],
         place=None if place is None else Place(place.face[order], place.barycentric[order]),
     )
-    return ordered, face_order.astype(np.int32)
+    return ordered, face_order
+
+
+@kernel
+def _begin_with_smallest(faces: Indices, turn: NDArray[np.int8]) -> None:
+    """Turn each of the faces (m, 3) so that it begins with its smallest vertex, by `turn` (m,) corners."""
+    for f in range(len(faces)):
+        a, b, c = faces[f]
+        turn[f] = 0 if a <= b and a <= c else (1 if b <= c else 2)
+        if turn[f] == 1:
+            faces[f, 0], faces[f, 1], faces[f, 2] = b, c, a
+        elif turn[f] == 2:
+            faces[f, 0], faces[f, 1], faces[f, 2] = c, a, b
+
+
+def _order_points(points: Vectors) -> Indices:
+    """Points (n, 3) along the curve, those of one code by their coordinates, and then as they come; (n,)."""
+    code = morton_codes(points)
+    order = order_codes(code)
+    same = code[order[1:]] == code[order[:-1]]
+    tied = np.flatnonzero(np.append(same, False) | np.append(False, same))
+    if len(tied):
+        chosen = order[tied]
+        x, y, z = points[chosen].T
+        order[tied] = chosen[np.lexsort((z, y, x, code[chosen]))]
+    return order

@@ -21,17 +21,17 @@ from weathercoat.errors import (
     ScaleError,
 )
 from weathercoat.mesh import topology
+from weathercoat.mesh.buckets import compact_indices, order_rows
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.surface import Surface
-from weathercoat.mesh.topology import cross, dot
+from weathercoat.mesh.topology import dot, normal_of
 from weathercoat.mesh.triangulate import triangulate
+from weathercoat.mesh.weld import SINGLE, weld
 
 Points = NDArray[np.float64]
 Faces = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
-# Spacing of float32 numbers, relative.
-SINGLE = 2.0**-23
 # A shape is refused where its coordinates resolve less than a thousandth of its diagonal.
 MIN_RESOLUTION = 1e-3
 # Between these diagonals, faces of a millionth of the size have areas that float32, in which results are
@@ -70,7 +70,9 @@ def repair(
     notes += _drop_nonfinite(polygons)
     if not len(polygons.corners):
         raise NoAreaError("no face has a corner")
-    check_precision(polygons.positions[polygons.corners], polygons.single_precision)
+    is_used = np.zeros(len(polygons.positions), bool)
+    is_used[polygons.corners] = True
+    check_precision(polygons.positions[is_used], len(polygons.corners), polygons.single_precision)
 
     triangles, polygon = triangulate(polygons.positions, polygons.corners, polygons.sizes)
     too_small = int((polygons.sizes < 3).sum())
@@ -86,7 +88,7 @@ def repair(
     if unreferenced:
         notes.append(Note("W-UNREFERENCED", unreferenced, "vertices that no face uses were dropped"))
     vertices = polygons.positions[kept_vertices]
-    faces = vertex[triangles].astype(np.int32)
+    faces = vertex[triangles]
     uv = np.zeros((len(faces), 3, 2)) if polygons.uv is None else polygons.uv[triangles]
     face_group = (
         np.zeros(len(faces), np.int32) if polygons.face_group is None else polygons.face_group[polygon]
@@ -105,15 +107,15 @@ def repair(
     faces, flipped, parent, more = make_oriented_manifold(vertices, faces)
     notes += more
     uv[flipped] = uv[flipped][:, [0, 2, 1]]
-    used, compact = np.unique(faces, return_inverse=True)
+    used, compact = compact_indices(faces, len(parent))
     origin = kept_vertices[parent[used]]
     return Surface(
-        vertices=np.ascontiguousarray(polygons.positions[origin]),
-        faces=compact.reshape(-1, 3).astype(np.int32),
+        vertices=polygons.positions[origin],
+        faces=compact,
         face_group=face_group[source].astype(np.int32),
         groups=polygons.groups,
         uv=None if polygons.uv is None else uv,
-        colors=None if polygons.colors is None else np.ascontiguousarray(polygons.colors[origin]),
+        colors=None if polygons.colors is None else polygons.colors[origin],
         up=up,
         notes=tuple(notes),
         name=name,
@@ -121,8 +123,10 @@ def repair(
     )
 
 
-def check_precision(points: Points, single_precision: bool) -> None:
+def check_precision(points: Points, corners: int, single_precision: bool) -> None:
     """Refuse points (k, 3) whose coordinates are too coarse for their extent, too large or too small.
+
+    corners: how many corners of faces lie on them.
 
     Errors: PrecisionError, ScaleError, NoAreaError where all points coincide.
     """
@@ -131,7 +135,7 @@ def check_precision(points: Points, single_precision: bool) -> None:
         diagonal = float(np.linalg.norm(high - low))
     largest = float(np.abs([low, high]).max())
     resolution = largest * SINGLE if single_precision else float(np.spacing(largest))
-    if diagonal == 0.0 and (largest == 0.0 or len(points) == 3):
+    if diagonal == 0.0 and (largest == 0.0 or corners == 3):
         raise NoAreaError("all vertices lie at one point")
     if resolution > MIN_RESOLUTION * diagonal:
         raise PrecisionError(
@@ -141,39 +145,6 @@ def check_precision(points: Points, single_precision: bool) -> None:
         raise ScaleError(
             f"the model spans {diagonal:.3g}; sizes from {MIN_DIAGONAL:g} to {MAX_DIAGONAL:g} are possible"
         )
-
-
-def weld(positions: Points, corners: Indices, part: Indices | None = None) -> tuple[Indices, Indices, int]:
-    """Merge the vertices in use that lie at the same position and in the same `part` (n,).
-
-    The tolerance is the rounding of float32, relative, so that no scale, proportion or offset changes what
-    is merged: two coordinates are the same where they differ by 2^-23 of their own magnitude, since most
-    programs round to float32 whatever they write afterwards; on an axis on which the model lies far from
-    the origin, 2^-23 of its extent there instead. It never exceeds 2^-22 of the extent, far below the
-    thickness of any sheet.
-
-    Returns for each corner its vertex after welding, (k,); for each of those the first vertex of the file
-    there; and how many vertices were merged away.
-    """
-    used, compact = np.unique(corners, return_inverse=True)
-    points = np.ascontiguousarray(positions[used])
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = high - low
-    is_far = np.maximum(np.abs(low), np.abs(high)) > 2.0 * extent
-    tolerance = SINGLE * np.where(is_far, extent, np.abs(points))
-    # A lattice on which points within the tolerance are at most two steps apart: of the leading bits, or
-    # even.
-    bits = np.abs(points).view(np.int64) >> (52 - 23)
-    step = SINGLE * extent
-    even = (points - low) / np.where(step > 0, step, 1.0)
-    lattice = np.where(is_far, even.astype(np.int64), np.where(points < 0, -bits, bits))
-    first = np.empty(len(points), np.int64)
-    within = np.zeros(len(points), np.int64) if part is None else part[used]
-    _merge_near(points, within, lattice, tolerance, first)
-    kept = np.flatnonzero(first == np.arange(len(first)))
-    number = np.empty(len(points), np.int64)
-    number[kept] = np.arange(len(kept))
-    return number[first[compact.ravel()]], used[kept], len(points) - len(kept)
 
 
 def remove_degenerate(
@@ -187,10 +158,10 @@ def remove_degenerate(
     face the one whose attributes it has, and how many had no area.
     """
     source = np.arange(len(faces))
-    uv = uv.copy()
     degenerate = int((_has_repeats(faces) | is_flat(vertices, faces)).sum())
     if not degenerate:
         return faces, uv, source, 0
+    uv = uv.copy()
     for _ in range(MAX_ROUNDS):
         faces, uv, source = _select(~_has_repeats(faces), faces, uv, source)
         flat = np.flatnonzero(is_flat(vertices, faces))
@@ -213,7 +184,8 @@ def _select(
 
 
 def _has_repeats(faces: Faces) -> NDArray[np.bool_]:
-    return (faces == np.roll(faces, 1, axis=1)).any(axis=1)  # type: ignore[no-any-return]
+    a, b, c = faces.T
+    return (a == b) | (b == c) | (c == a)
 
 
 def _edge_lengths(vertices: Points, faces: Faces) -> Points:
@@ -237,18 +209,17 @@ def _merge_shortest(vertices: Points, faces: Faces, needles: Indices) -> Faces:
 
 def is_flat(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Whether the corners of each face lie on a line: height at most `MIN_HEIGHT` of the longest edge."""
-    corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    longest = np.max(((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2), axis=1, initial=0.0)
-    return np.linalg.norm(normal, axis=1) <= MIN_HEIGHT * longest  # type: ignore[no-any-return]
+    flat = np.empty(len(faces), np.bool_)
+    _find_flat(vertices, faces, flat)
+    return flat
 
 
 def first_of_duplicates(faces: Faces) -> NDArray[np.bool_]:
     """Whether each face is the first on its three vertices, whatever their order."""
-    a, b, c = np.sort(faces, axis=1).T.astype(np.int64)
-    pair = a * (int(faces.max(initial=0)) + 1) + b
-    order = np.lexsort((c, pair))
-    repeats = (pair[order][1:] == pair[order][:-1]) & (c[order][1:] == c[order][:-1])
+    rows = np.sort(faces, axis=1)
+    order = order_rows(rows, int(faces.max(initial=-1)) + 1)
+    rows = rows[order]
+    repeats = (rows[1:] == rows[:-1]).all(axis=1)
     keep = np.ones(len(faces), bool)
     keep[order[1:][repeats]] = False
     return keep
@@ -265,10 +236,13 @@ def make_oriented_manifold(
     twin, crowded = topology.match_twins(vertices, faces)
     first = topology.orient(vertices, faces, twin)
     split, parent = topology.separate(len(vertices), faces, first.twin, first.flipped)
-    # Cuts that turned out to separate nothing are closed again in the final twins, which may close a
-    # component.
-    final_twin, _ = topology.match_twins(vertices[parent], split)
-    final = topology.orient(vertices[parent], split, final_twin)
+    if first.flipped.any() or len(parent) > len(vertices):
+        # Cuts that turned out to separate nothing are closed again in the final twins, which may close a
+        # component.
+        final_twin, _ = topology.match_twins(vertices[parent], split)
+        final = topology.orient(vertices[parent], split, final_twin)
+    else:
+        final_twin, final = twin, first
     boundary = int((final_twin < 0).sum())
     loops = topology.count_boundary_loops(split, final_twin)
     split[final.flipped] = split[final.flipped][:, [0, 2, 1]]
@@ -316,50 +290,6 @@ def _drop_nonfinite(polygons: Polygons) -> list[Note]:
         raise NonFiniteError(f"all {dropped} faces have a position that is not finite")
     polygons.keep_faces(keep)
     return [Note("W-NONFINITE", vertices, f"vertices are not finite; {dropped} faces were dropped with them")]
-
-
-@kernel
-def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-untyped-def]
-    """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each, or itself.
-
-    Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell
-    holds more than a few.
-    """
-    n = len(points)
-    size = 16
-    while size < 2 * n:
-        size *= 2
-    head = np.full(size, -1, np.int64)
-    behind = np.full(n, -1, np.int64)
-    for i in range(n):
-        x, y, z = lattice[i]
-        first[i] = i
-        for a in range((x - 2) >> 2, ((x + 2) >> 2) + 1):
-            for b in range((y - 2) >> 2, ((y + 2) >> 2) + 1):
-                for c in range((z - 2) >> 2, ((z + 2) >> 2) + 1):
-                    j = head[_slot(part[i], a, b, c, size)]
-                    while j >= 0:
-                        near = part[j] == part[i]
-                        for k in range(3):
-                            near = near and abs(points[j, k] - points[i, k]) <= tolerance[i, k]
-                        if near and j < first[i]:
-                            first[i] = j
-                        j = behind[j]
-        if first[i] == i:
-            slot = _slot(part[i], x >> 2, y >> 2, z >> 2, size)
-            behind[i] = head[slot]
-            head[slot] = i
-
-
-@kernel
-def _slot(part, a, b, c, size):  # type: ignore[no-untyped-def]
-    """A place in a hash table of `size` (a power of two) for a cell of a grid in a part."""
-    key = np.uint64(part) * np.uint64(0xD6E8FEB86659FD93)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(c) * np.uint64(0x94D049BB133111EB)
-    key ^= key >> np.uint64(32)
-    return np.int64(key & np.uint64(size - 1))
 
 
 @kernel
@@ -436,8 +366,25 @@ def _detach(faces, twin, f):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _find_flat(vertices, faces, flat):  # type: ignore[no-untyped-def]
+    for f in range(len(faces)):
+        flat[f] = _is_flat(vertices, faces, f)
+
+
+@kernel
 def _is_flat(vertices, faces, f):  # type: ignore[no-untyped-def]
-    a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-    normal = cross(b - a, c - a)
-    longest = max(dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c))
-    return np.sqrt(dot(normal, normal)) <= MIN_HEIGHT * longest
+    a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+    x, y, z = normal_of(vertices, a, b, c)
+    longest = max(_square(vertices, a, b), _square(vertices, b, c), _square(vertices, c, a))
+    return np.sqrt(x * x + y * y + z * z) <= MIN_HEIGHT * longest
+
+
+@kernel
+def _square(vertices, a, b):  # type: ignore[no-untyped-def]
+    """Squared distance of two vertices."""
+    x, y, z = (
+        vertices[b, 0] - vertices[a, 0],
+        vertices[b, 1] - vertices[a, 1],
+        vertices[b, 2] - vertices[a, 2],
+    )
+    return x * x + y * y + z * z

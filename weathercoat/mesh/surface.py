@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.errors import Note
+from weathercoat.mesh.buckets import compact_indices
 
 Vectors = NDArray[np.float64]
 Indices = NDArray[np.int32]
+
+_ROWS = 8192  # faces at a time, so that what is worked out for them stays in the cache
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,12 @@ class Surface:
         more.
         """
         faces = self.faces[keep]
-        used, renumbered = np.unique(faces, return_inverse=True)
+        used, renumbered = compact_indices(faces, len(self.vertices))
         place = None if self.place is None else Place(self.place.face[used], self.place.barycentric[used])
         return replace(
             self,
             vertices=self.vertices[used],
-            faces=renumbered.reshape(-1, 3).astype(np.int32),
+            faces=renumbered,
             face_group=self.face_group[keep],
             uv=None if self.uv is None else self.uv[keep],
             colors=None if self.colors is None else self.colors[used],
@@ -120,16 +123,21 @@ def vertex_normals(vertices: Vectors, faces: Indices) -> Vectors:
 
     Source: Thuermer and Wuethrich, Computing vertex normals from polygonal facets, 1998.
     """
-    corner = vertices[faces]
-    normal = face_normals(vertices, faces)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    weighted = np.empty((3, 3, len(faces)))  # by corner, axis and face
+    for start in range(0, len(faces), _ROWS):
+        rows = slice(start, start + _ROWS)
+        corner = vertices[faces[rows]]
+        side = [corner[:, (i + 1) % 3] - corner[:, i] for i in range(3)]
+        normal = np.cross(side[0], -side[2])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+        for i in range(3):
+            a, b = side[i], -side[i - 1]
+            angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+            weighted[i, :, rows] = (normal * angle[:, None]).T
     result = np.zeros_like(vertices)
     for i in range(3):
-        a = corner[:, (i + 1) % 3] - corner[:, i]
-        b = corner[:, (i + 2) % 3] - corner[:, i]
-        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
         for axis in range(3):
-            result[:, axis] += np.bincount(faces[:, i], normal[:, axis] * angle, len(vertices))
+            result[:, axis] += np.bincount(faces[:, i], weighted[i, axis], len(vertices))
     length = np.linalg.norm(result, axis=1, keepdims=True)
     return np.divide(result, length, out=np.zeros_like(result), where=length > 0)

@@ -11,8 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.buckets import compact_indices
+from weathercoat.mesh.pairing import pair_half_edges
 
-Ints = NDArray[np.int64]
+Ints = NDArray[np.integer]
+Indices = NDArray[np.int32]
 Faces = NDArray[np.int32]
 Points = NDArray[np.float64]
 
@@ -25,47 +28,41 @@ class Orientation:
     component that cannot be oriented was opened; components_cut: how many components that concerns.
     """
 
-    twin: Ints
-    component: Ints
+    twin: Indices
+    component: Indices
     flipped: NDArray[np.bool_]
     cut: int
     components_cut: int
 
 
-def match_twins(vertices: Points, faces: Faces) -> tuple[Ints, Ints]:
+def match_twins(vertices: Points, faces: Faces) -> tuple[Indices, Ints]:
     """The half-edge on the other side of each, (3 m,), -1 at a boundary; one half-edge of each crowded edge.
 
     Crowded are edges of more than two faces. The faces around one are paired two by two: first those that
     agree in orientation, the straightest first; what is left over ends there, and so do all faces around an
     edge of more than 64.
     """
-    tail = faces.ravel().astype(np.int64)
-    head = np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    key = np.minimum(tail, head) * (len(vertices) + 1) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    begin = (
-        np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
-    )
-    count = np.diff(np.append(begin, len(key)))
-    twin = np.full(len(tail), -1, np.int64)
-    two = begin[count == 2]
-    twin[order[two]] = order[two + 1]
-    twin[order[two + 1]] = order[two]
-    many = np.flatnonzero(count > 2)
-    _pair(vertices, faces, order, begin[many], count[many], twin)
-    return twin, order[begin[many]]
+    twin, beyond, _ = pair_half_edges(np.ascontiguousarray(faces), len(vertices))
+    crowded = np.unique(beyond[:, 0])
+    if len(crowded):
+        number = np.arange(len(crowded))
+        edge = np.concatenate([number, number, np.searchsorted(crowded, beyond[:, 0])])
+        around = np.concatenate([crowded, twin[crowded], beyond[:, 1]])[np.argsort(edge, kind="stable")]
+        count = np.bincount(edge)
+        twin[around] = -1
+        _pair(vertices, faces, around, np.cumsum(count) - count, count, twin)
+    return twin, crowded
 
 
-def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
+def orient(vertices: Points, faces: Faces, twin: Indices) -> Orientation:
     """One orientation for each component: outward where it is closed, else that of the greater area.
 
     A component that cannot be oriented is cut along the edges where its orientations meet.
     """
     twin = twin.copy()
-    component = np.full(len(faces), -1, np.int64)
+    component = np.full(len(faces), -1, np.int32)
     turned = np.zeros(len(faces), np.bool_)
-    queue = np.empty(len(faces), np.int64)
+    queue = np.empty(len(faces), np.int32)
     components = _spread_orientation(faces, twin, component, turned, queue)
     cut_component = np.zeros(components, bool)
     contradicting = _contradictions(faces, twin, turned)
@@ -73,20 +70,9 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
     other = twin[contradicting]
     twin[contradicting] = -1
     twin[other] = -1
-    corner = vertices[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = 0.5 * np.linalg.norm(normal, axis=1)
-    sign = np.where(turned, -1.0, 1.0)
-    total = np.bincount(component, area, components)
-    kept = np.bincount(component, area * sign, components)
-    # Volumes about the middle of each component, so that a far origin costs no digits.
-    total_center = np.stack(
-        [np.bincount(component, corner[:, :, k].mean(axis=1), components) for k in range(3)], axis=1
-    )
-    middle = total_center / np.bincount(component, minlength=components)[:, None]
-    arm = corner.mean(axis=1) - middle[component]
-    volume = np.bincount(component, sign * np.einsum("ij,ij->i", arm, normal) / 6.0, components)
-    closed = np.bincount(component, (twin.reshape(-1, 3) < 0).any(axis=1), components) == 0
+    total, kept, volume = np.zeros(components), np.zeros(components), np.zeros(components)
+    closed = np.ones(components, np.bool_)
+    _measure_components(vertices, faces, twin, component, turned, total, kept, volume, closed)
     solid = closed & (np.abs(volume) > 1e-12 * total**1.5)
     turn_component = np.where(solid, volume < 0, kept < 0)
     return Orientation(
@@ -98,29 +84,22 @@ def orient(vertices: Points, faces: Faces, twin: Ints) -> Orientation:
     )
 
 
-def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, Ints]:
+def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, NDArray[np.int64]]:
     """Faces in which every vertex has one fan: corners that no common edge joins get vertices of their own.
 
     Returns the faces (m, 3) and the old vertex of each new vertex; the first fan of a vertex keeps its
     number.
     """
-    fan = np.arange(3 * len(faces))
+    fan = np.arange(3 * len(faces), dtype=np.int32)
     _join_fans(faces, twin, fan)
-    old = faces.ravel()
-    is_root = fan == np.arange(len(fan))
-    roots = np.flatnonzero(is_root)
-    by_vertex = roots[np.argsort(old[roots], kind="stable")]
-    vertex = old[by_vertex]
-    first = np.concatenate([[True], vertex[1:] != vertex[:-1]]) if len(vertex) else np.zeros(0, bool)
-    number = np.empty(len(fan), np.int64)
-    number[by_vertex[first]] = vertex[first]
-    extra = np.sort(by_vertex[~first])
-    number[extra] = vertex_count + np.arange(len(extra))
-    parent = np.concatenate([np.arange(vertex_count), old[extra]])
-    return number[fan].reshape(-1, 3).astype(np.int32), parent
+    split = np.empty((len(faces), 3), np.int32)
+    extra = _number_fans(faces, fan, vertex_count, split)
+    return split, np.concatenate([np.arange(vertex_count), faces.ravel()[extra]])
 
 
-def separate(vertex_count: int, faces: Faces, twin: Ints, flipped: NDArray[np.bool_]) -> tuple[Faces, Ints]:
+def separate(
+    vertex_count: int, faces: Faces, twin: Ints, flipped: NDArray[np.bool_]
+) -> tuple[Faces, NDArray[np.int64]]:
     """Split vertices until no directed edge of the faces, turned where `flipped`, occurs twice.
 
     Cutting an edge is not enough where the fans at both of its ends still hold together around it: such an
@@ -132,6 +111,9 @@ def separate(vertex_count: int, faces: Faces, twin: Ints, flipped: NDArray[np.bo
     while True:
         split, parent = split_vertices(vertex_count, faces, twin)
         split[flipped] = split[flipped][:, [0, 2, 1]]
+        _, beyond, alike = pair_half_edges(split, len(parent))
+        if not len(beyond) and not alike:
+            return split, parent
         # Half-edge i of a turned face is half-edge 2 - i of the face as it was.
         tail = split.astype(np.int64)
         head = np.roll(tail, -1, axis=1)
@@ -157,8 +139,8 @@ def count_boundary_loops(faces: Faces, twin: Ints) -> int:
     boundary = np.flatnonzero(twin < 0)
     tail = faces.ravel()[boundary]
     head = np.roll(faces, -1, axis=1).ravel()[boundary]
-    vertices, ends = np.unique(np.concatenate([tail, head]), return_inverse=True)
-    label = merged(len(vertices), ends.reshape(2, -1))
+    vertices, ends = compact_indices(np.stack([tail, head]), int(faces.max(initial=-1)) + 1)
+    label = merged(len(vertices), ends)
     return int((label == np.arange(len(label))).sum())
 
 
@@ -188,15 +170,15 @@ def cross(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _pair(vertices, faces, order, begin, count, twin):  # type: ignore[no-untyped-def]
-    """Pair the half-edges order[begin : begin + count] around each edge; sets entries of `twin`."""
+def _pair(vertices, faces, half_edges, begin, count, twin):  # type: ignore[no-untyped-def]
+    """Pair the half_edges[begin : begin + count] around each edge; sets entries of `twin`."""
     apex = np.empty((64, 3))
     forward = np.empty(64, np.bool_)
     for e in range(len(begin)):
         n = count[e]
         if n > 64:
             continue
-        around = order[begin[e] : begin[e] + n]
+        around = half_edges[begin[e] : begin[e] + n]
         h = around[0]
         tail = faces[h // 3, h % 3]
         a = vertices[tail]
@@ -273,6 +255,84 @@ def _contradictions(faces, twin, turned):  # type: ignore[no-untyped-def]
         if t >= 0:
             found[h] = (turned[h // 3] ^ turned[t // 3]) == _agree(faces, h, t)
     return np.flatnonzero(found)
+
+
+@kernel
+def _measure_components(vertices, faces, twin, component, turned, total, kept, volume, closed):  # type: ignore[no-untyped-def]
+    """Area of each component, that of its unturned faces less the rest, volume, and whether it is closed.
+
+    Volumes are about the middle of each component, so that a far origin costs no digits.
+    """
+    middle = np.zeros((len(total), 3))
+    size = np.zeros(len(total), np.int64)
+    for f in range(len(faces)):
+        c = component[f]
+        size[c] += 1
+        for k in range(3):
+            middle[c, k] += _mean_of(vertices, faces, f, k)
+            if twin[3 * f + k] < 0:
+                closed[c] = False
+    for c in range(len(total)):
+        for k in range(3):
+            middle[c, k] /= size[c]
+    for f in range(len(faces)):
+        c = component[f]
+        normal = normal_of(vertices, faces[f, 0], faces[f, 1], faces[f, 2])
+        area = 0.5 * np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+        sign = -1.0 if turned[f] else 1.0
+        total[c] += area
+        kept[c] += area * sign
+        height = 0.0
+        for k in range(3):
+            height += (_mean_of(vertices, faces, f, k) - middle[c, k]) * normal[k]
+        volume[c] += sign * height / 6.0
+
+
+@kernel
+def normal_of(vertices, a, b, c):  # type: ignore[no-untyped-def]
+    """Normal of the triangle a, b, c of vertices (n, 3), with twice its area as length: three numbers."""
+    ux, uy, uz = (
+        vertices[b, 0] - vertices[a, 0],
+        vertices[b, 1] - vertices[a, 1],
+        vertices[b, 2] - vertices[a, 2],
+    )
+    vx, vy, vz = (
+        vertices[c, 0] - vertices[a, 0],
+        vertices[c, 1] - vertices[a, 1],
+        vertices[c, 2] - vertices[a, 2],
+    )
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@kernel
+def _mean_of(vertices, faces, f, k):  # type: ignore[no-untyped-def]
+    """Coordinate k of the centre of face f."""
+    return (vertices[faces[f, 0], k] + vertices[faces[f, 1], k] + vertices[faces[f, 2], k]) / 3.0
+
+
+@kernel
+def _number_fans(faces, fan, vertex_count, split):  # type: ignore[no-untyped-def]
+    """Write the vertices of the corners to `split` (m, 3); returns the first corners of the new vertices.
+
+    The first fan of a vertex keeps its number, the others get new ones in the order of their first corners,
+    `fan` (3 m,).
+    """
+    corner = faces.reshape(-1)
+    number = split.reshape(-1)
+    extra = np.empty(len(fan), np.int32)
+    is_taken = np.zeros(vertex_count, np.bool_)
+    added = 0
+    for h in range(len(fan)):
+        if fan[h] != h:
+            number[h] = number[fan[h]]
+        elif is_taken[corner[h]]:
+            number[h] = vertex_count + added
+            extra[added] = h
+            added += 1
+        else:
+            is_taken[corner[h]] = True
+            number[h] = corner[h]
+    return extra[:added].copy()
 
 
 @kernel
