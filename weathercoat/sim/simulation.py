@@ -87,10 +87,10 @@ class Simulation:
         """The age after a number of steps."""
         return self.duration * steps / self.steps
 
-    def step(self) -> None:
-        """One tick of ageing: age, separate, fracture, flake, deform, stain."""
-        self.step_count += 1
-        age, tick = self.age, self.duration / self.steps
+    def step(self, count: int = 1) -> None:
+        """Age by `count` steps at once: age, separate, fracture, flake, deform, stain."""
+        self.step_count += count
+        age, tick = self.age, count * self.duration / self.steps
         started = time.perf_counter()
         self.log.clear()
 
