@@ -79,8 +79,18 @@ def is_cold() -> bool:
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors."""
+    """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors.
+
+    It runs without the interpreter's lock, so that threads can share work.
+    """
     package, _, module = function.__module__.partition(".")
     numba.config.CACHE_DIR = str(kernel_folder(module))  # type: ignore[attr-defined]
     can_cache = _CAN_CACHE and package == __name__.partition(".")[0]
-    return numba.njit(cache=can_cache, fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=can_cache, fastmath=False, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+
+
+def formula(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A piece of arithmetic that becomes part of each kernel that calls it, so that loops over it can be
+    vectorised.
+    """
+    return numba.njit(inline="always", fastmath=False, error_model="numpy")(function)  # type: ignore[no-any-return]

@@ -16,7 +16,7 @@ import numpy as np
 from weathercoat.compile import is_cold
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
-from weathercoat.deform.sweeps import DeformParameters
+from weathercoat.deform.deformation import DeformParameters
 from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.frame import make_frame

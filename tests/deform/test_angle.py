@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 from tests import zoo
 from tests.mesh.test_dihedral import bend_of, gradient_of, hinges
-from weathercoat.deform.angle import project_arccos_angles, project_dihedrals, project_split_angles
+from weathercoat.deform.angle import FORMS
+from weathercoat.deform.plain import project_angles
 from weathercoat.mesh.surface import Vectors
 
 HINGE = np.array([(0, 1, 2, 3)], np.int32)
 FREE = np.ones(4)
 CLAMPED = np.array([0.0, 0.0, 1.0, 1.0])
-SIGNED = {"dihedral": project_dihedrals, "split": project_split_angles}
+SIGNED = ["dihedral", "split"]
 
 
 def project(
@@ -28,10 +29,9 @@ def project(
 ) -> Vectors:
     """The hinge after a number of projections on a wanted bend."""
     result = np.array(points, float)
-    kernel = {**SIGNED, "arccos": project_arccos_angles}[form]
     wanted = np.tan(target / 2) if form == "dihedral" else target
     for _ in range(times):
-        kernel(result, inverse_mass, HINGE, np.array([wanted]), stiffness)
+        project_angles(FORMS[form], result, inverse_mass, HINGE, np.array([wanted]), stiffness)
     return result
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weathercoat.deform.length import project_lengths
+from weathercoat.deform.plain import project_lengths
 from weathercoat.mesh.surface import Vectors
 
 ONE_EDGE = np.array([(0, 1)], np.int32)

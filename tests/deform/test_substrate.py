@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from weathercoat.deform.substrate import lift_to_substrate
+from weathercoat.deform.plain import lift_to_substrate
 
 
 def test_only_what_is_below_moves_and_only_along_the_normal() -> None:

@@ -7,21 +7,16 @@ import pytest
 
 from tests import zoo
 from tests.zoo import find_edge, make_mesh
-from weathercoat.deform.angle import project_dihedrals
-from weathercoat.deform.length import project_lengths
-from weathercoat.deform.substrate import lift_to_substrate
-from weathercoat.deform.sweeps import (
-    Constraints,
-    DeformParameters,
-    bend_targets,
-    deform,
-    follow_events,
-    interleave,
-    make_constraints,
-    measure_residual,
-    pack,
-    release,
+from weathercoat.deform.angle import DIHEDRAL
+from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
+from weathercoat.deform.deformation import DeformParameters, deform, measure_residual
+from weathercoat.deform.plain import (
+    bends_wanted,
+    deform_plainly,
+    project_angles,
+    project_lengths,
 )
+from weathercoat.deform.runs import LANES, Runs
 from weathercoat.mesh.dihedral import all_bends
 from weathercoat.mesh.halfedge import HalfEdgeMesh, cut_edge, make_event_log, next_of, prev_of
 from weathercoat.mesh.shapes import make_sphere
@@ -47,37 +42,34 @@ def released(surface: Surface, vertices: list[int], age: float = 0.0) -> tuple[H
     mesh = make_mesh(surface)
     constraints = make_constraints(mesh)
     release(mesh, constraints, np.array(vertices, np.int32), age)
-    pack(mesh, constraints)
     return mesh, constraints
 
 
-def active_lengths(constraints: Constraints) -> list[tuple[int, int]]:
-    return sorted(tuple(sorted(map(int, pair))) for pair in constraints.length_ends)
+def packed(runs: Runs) -> tuple[list[list[int]], list[int]]:
+    """The vertices and the half-edge of each active constraint, in the order of slots."""
+    lanes = [(lane, int(h)) for lane, h in zip(runs.lane, runs.half_edge, strict=True) if lane >= 0]
+    vertices = [runs.vertices[lane // LANES, :, lane % LANES].tolist() for lane, _ in lanes]
+    return vertices, [h for _, h in lanes]
+
+
+def active_lengths(constraints: Constraints) -> list[tuple[int, ...]]:
+    return sorted(tuple(sorted(pair)) for pair in packed(constraints.lengths)[0])
 
 
 def active_hinges(mesh: HalfEdgeMesh, constraints: Constraints) -> set[tuple[int, int]]:
-    return zoo.edge_ends(mesh, constraints.hinge_edges)
+    return zoo.edge_ends(mesh, np.array(packed(constraints.angles)[1], np.int32))
+
+
+def free_vertices(constraints: Constraints) -> list[int]:
+    return np.flatnonzero(constraints.planes.lane >= 0).tolist()
 
 
 # --- what is active ---
 
 
-@pytest.mark.parametrize("count", [1, 60, 61, 62, 500])
-def test_interleave_is_a_permutation_in_strides(count: int) -> None:
-    order = interleave(count)
-    assert sorted(order.tolist()) == list(range(count))
-    assert order[: (count + 60) // 61].tolist() == list(range(0, count, 61))
-
-
-def test_interleave_stays_within_a_tile() -> None:
-    tile = 64 * 61
-    order = interleave(3 * tile + 100)
-    assert (order // tile == np.arange(len(order)) // tile).all()
-
-
 def test_an_attached_film_has_no_constraint() -> None:
     mesh, constraints = released(zoo.make_disc(), [])
-    assert len(constraints.length_ends) == len(constraints.hinges) == len(constraints.free_vertices) == 0
+    assert packed(constraints.lengths)[0] == packed(constraints.angles)[0] == free_vertices(constraints) == []
     before = mesh.positions.copy()
     deform(mesh, constraints, parameters(), 1.0)
     assert np.array_equal(mesh.positions, before, equal_nan=True)
@@ -92,8 +84,8 @@ def test_a_released_vertex_holds_its_edges_and_bends_the_opposite_ones() -> None
     assert active_hinges(mesh, constraints) == {
         (min(a, b), max(a, b)) for a, b in zip(ring, [*ring[1:], 1], strict=True)
     }
-    assert constraints.free_vertices.tolist() == [0]
-    for p1, p2, p3, p4 in constraints.hinges:
+    assert free_vertices(constraints) == [0]
+    for p1, p2, p3, p4 in packed(constraints.angles)[0]:
         assert {int(p3), int(p4)} >= {0}, "an apex is the released vertex"
         assert p1 != p2 and p4 not in (p1, p2, p3)
 
@@ -128,25 +120,24 @@ def test_a_broken_edge_loses_its_angle_and_has_two_lengths() -> None:
     """Paper 5.2: the length is doubled, one for each half-edge, and nothing refers across the crack."""
     surface = zoo.make_hexagon(2)
     mesh, constraints = released(surface, list(range(19)))
-    lengths, angles = len(constraints.length_ends), len(constraints.hinges)
+    lengths, angles = len(active_lengths(constraints)), len(packed(constraints.angles)[0])
     log = make_event_log(len(surface.faces))
     for k in (1, 4):
         cut_edge(mesh, log, zoo.find_half_edge(mesh, 0, k))
-    follow_events(constraints, log)
-    pack(mesh, constraints)
-    assert len(constraints.length_ends) == lengths + 2
-    assert len(constraints.hinges) == angles - 2
+    follow_events(mesh, constraints, log)
+    assert len(active_lengths(constraints)) == lengths + 2
+    assert len(packed(constraints.angles)[0]) == angles - 2
     (new,) = log.split_entries()[:, 0]
-    assert constraints.inverse_mass[new] == 1.0 and new in constraints.free_vertices
+    assert constraints.inverse_mass[new] == 1.0 and new in free_vertices(constraints)
     sides = {
         v: set(mesh.tail.reshape(-1, 3)[(mesh.tail.reshape(-1, 3) == v).any(axis=1)].flat) for v in (0, new)
     }
     for v, other in ((0, new), (new, 0)):
-        for packed in (constraints.length_ends, constraints.hinges):
-            rows = packed[(packed == v).any(axis=1)]
-            assert len(rows) > 0 and not (rows == other).any()
-            if packed is constraints.length_ends:
-                assert set(rows.flat) <= sides[v]
+        for runs in (constraints.lengths, constraints.angles):
+            rows = [vertices for vertices in packed(runs)[0] if v in vertices]
+            assert rows and not any(other in vertices for vertices in rows)
+            if runs is constraints.lengths:
+                assert {end for ends in rows for end in ends} <= sides[v]
 
 
 def test_fallen_faces_take_their_constraints_along() -> None:
@@ -156,10 +147,9 @@ def test_fallen_faces_take_their_constraints_along() -> None:
     mesh.alive[6] = False
     mesh.half_edge[7:10] = -1
     log.falls[0], log.counts[2] = 6, 1
-    follow_events(constraints, log)
-    pack(mesh, constraints)
-    assert constraints.length_ends.max() < 7
-    assert constraints.free_vertices.tolist() == list(range(7))
+    follow_events(mesh, constraints, log)
+    assert max(max(pair) for pair in active_lengths(constraints)) < 7
+    assert free_vertices(constraints) == list(range(7))
 
 
 def test_every_live_edge_of_a_free_film_is_constrained_once() -> None:
@@ -167,17 +157,22 @@ def test_every_live_edge_of_a_free_film_is_constrained_once() -> None:
         surface = zoo.ZOO[name]()
         mesh, constraints = released(surface, list(range(len(surface.vertices))))
         inner = int((mesh.twin >= 0).sum()) // 2
-        assert len(constraints.length_ends) == inner + int((mesh.twin < 0).sum())
-        assert len(set(active_lengths(constraints))) == len(constraints.length_ends)
-        assert len(constraints.hinges) == inner
-        for h, hinge in zip(constraints.hinge_edges, constraints.hinges, strict=True):
+        assert len(active_lengths(constraints)) == inner + int((mesh.twin < 0).sum())
+        assert len(set(active_lengths(constraints))) == len(active_lengths(constraints))
+        assert len(packed(constraints.angles)[0]) == inner
+        for hinge, h in zip(*packed(constraints.angles), strict=True):
             g = mesh.twin[h]
             assert h < g
             expected = [mesh.tail[h], mesh.tail[next_of(h)], mesh.tail[prev_of(h)], mesh.tail[prev_of(g)]]
-            assert hinge.tolist() == expected
+            assert hinge == expected
 
 
 # --- what is aimed at ---
+
+
+def targets_of(constraints: Constraints, p: DeformParameters, age: float) -> Vectors:
+    edges = np.array(packed(constraints.angles)[1], np.int32)
+    return bends_wanted(constraints, edges, p, age)
 
 
 def test_curvature_targets_are_those_of_the_closed_form() -> None:
@@ -187,28 +182,28 @@ def test_curvature_targets_are_those_of_the_closed_form() -> None:
     span = np.linalg.norm(centres[0] - centres[1])
     for age in (0.25, 0.5, 3.0):
         expected = 0.2 - span / 2.0 * (1 - np.exp(-3.0 * (age - 0.25)))
-        assert bend_targets(constraints, parameters(), age) == pytest.approx([expected], abs=1e-14)
+        assert targets_of(constraints, parameters(), age) == pytest.approx([expected], abs=1e-14)
 
 
 def test_literal_angles_shrink_by_an_angle_per_age_to_a_floor() -> None:
     """phi falls by 0.8 per age from pi + 0.2 down to 2.6, where it stays."""
     _, constraints = released(zoo.make_hinge(0.2), [2, 3], age=0.25)
     literal = parameters(curl_rule="angle")
-    assert bend_targets(constraints, literal, 0.75) == pytest.approx([0.2 - 0.8 * 0.5], abs=1e-14)
-    assert bend_targets(constraints, literal, 9.0) == pytest.approx([2.6 - np.pi], abs=1e-14)
+    assert targets_of(constraints, literal, 0.75) == pytest.approx([0.2 - 0.8 * 0.5], abs=1e-14)
+    assert targets_of(constraints, literal, 9.0) == pytest.approx([2.6 - np.pi], abs=1e-14)
 
 
 @pytest.mark.parametrize("rule", ["curvature", "angle"])
 def test_targets_never_rise_above_their_start(rule: str) -> None:
     """A hinge that starts below the floor, or folded beyond the largest bend, keeps its start."""
     _, constraints = released(zoo.make_hinge(-3.0), [2, 3])
-    targets = bend_targets(constraints, parameters(curl_rule=rule, curl_radius=0.01), 5.0)
+    targets = targets_of(constraints, parameters(curl_rule=rule, curl_radius=0.01), 5.0)
     assert targets == pytest.approx([-3.0])
 
 
 def test_tight_curls_stop_short_of_folding_through() -> None:
     _, constraints = released(zoo.make_hinge(), [2, 3])
-    target = bend_targets(constraints, parameters(curl_radius=1e-3, curl_rate=100.0), 5.0)
+    target = targets_of(constraints, parameters(curl_radius=1e-3, curl_rate=100.0), 5.0)
     assert -np.pi < target[0] < -2.5
 
 
@@ -250,7 +245,7 @@ def curl_clamped(mesh: HalfEdgeMesh, lengths: Vectors, bends: Vectors, free: lis
     targets = np.tan(0.5 * bends[inner][movable])
     for _ in range(sweeps):
         project_lengths(mesh.positions, inverse_mass, ends[keep], lengths[edges][keep])
-        project_dihedrals(mesh.positions, inverse_mass, hinges[movable], targets, 1.0)
+        project_angles(DIHEDRAL, mesh.positions, inverse_mass, hinges[movable], targets, 1.0)
 
 
 def test_a_clamped_strip_curls_to_a_prism() -> None:
@@ -313,23 +308,17 @@ def test_attached_vertices_never_move_and_none_goes_below_the_metal(form: str) -
         assert height.max() > 1e-3, "nothing has curled"
 
 
-def test_a_sweep_is_lengths_then_angles_then_substrate() -> None:
-    """Bit for bit what the three kernels give in that order on the packed arrays."""
+@pytest.mark.parametrize("form", ["dihedral", "split", "arccos"])
+@pytest.mark.parametrize("rule", ["curvature", "angle"])
+def test_a_step_is_lengths_then_angles_then_substrate(form: str, rule: str) -> None:
+    """Bit for bit what the plain sweeps give in that order."""
     mesh, constraints = released(zoo.make_hexagon(2), [0, 1, 2, 8])
-    expected = mesh.positions.copy()
-    settings = parameters(deformation_sweeps=3)
-    targets = np.tan(0.5 * bend_targets(constraints, settings, 0.5))
-    for _ in range(3):
-        project_lengths(
-            expected, constraints.inverse_mass, constraints.length_ends, constraints.length_targets
-        )
-        project_dihedrals(expected, constraints.inverse_mass, constraints.hinges, targets, 1.0)
-        lift_to_substrate(
-            expected, mesh.origin, mesh.rest_positions, mesh.rest_normals, constraints.free_vertices
-        )
-    deform(mesh, constraints, settings, 0.5)
-    assert mesh.positions[:19].tobytes() == expected[:19].tobytes()
-    assert not (mesh.positions[:19] == mesh.rest_positions).all()
+    p = parameters(deformation_sweeps=3, deformation_angle=form, curl_rule=rule)
+    expected = mesh._replace(positions=mesh.positions.copy())
+    deform_plainly(expected, constraints, p, 0.5)
+    deform(mesh, constraints, p, 0.5)
+    assert mesh.positions[:19].tobytes() == expected.positions[:19].tobytes()
+    assert (mesh.positions[:19] == mesh.rest_positions).all() == (form == "arccos")
 
 
 def test_residual_of_known_errors() -> None:

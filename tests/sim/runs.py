@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.zoo import fans_by_vertex
-from weathercoat.deform.sweeps import DeformParameters
+from weathercoat.deform.deformation import DeformParameters
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.halfedge import check_half_edges, make_twins
 from weathercoat.mesh.surface import Surface

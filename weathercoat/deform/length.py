@@ -4,29 +4,23 @@ from __future__ import annotations
 
 import math
 
-from weathercoat.compile import kernel
-from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.compile import formula
+
+Ends = tuple[float, float, float, float, float, float]
 
 
-@kernel
-def project_lengths(positions: Vectors, inverse_mass: Vectors, ends: Indices, rest_length: Vectors) -> None:
-    """Move the ends of each edge, in order, to its rest length, shared by inverse mass; changes positions.
+@formula
+def meet_length(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float,
+    wa: float, wb: float, rest_length: float,
+) -> Ends:  # fmt: skip
+    """The ends a and b of an edge, moved to its rest length and shared by inverse mass.
 
-    ends: int32 (k, 2), at least one end of each with an inverse mass; rest_length: (k,). Edges of no length
-    stay.
+    At least one of the masses is not 0. An edge of no length stays.
     """
-    for i in range(len(ends)):
-        a, b = ends[i, 0], ends[i, 1]
-        wa, wb = inverse_mass[a], inverse_mass[b]
-        dx = positions[a, 0] - positions[b, 0]
-        dy = positions[a, 1] - positions[b, 1]
-        dz = positions[a, 2] - positions[b, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if length > 0.0:
-            scale = (length - rest_length[i]) / (length * (wa + wb))
-            positions[a, 0] -= wa * scale * dx
-            positions[a, 1] -= wa * scale * dy
-            positions[a, 2] -= wa * scale * dz
-            positions[b, 0] += wb * scale * dx
-            positions[b, 1] += wb * scale * dy
-            positions[b, 2] += wb * scale * dz
+    dx, dy, dz = ax - bx, ay - by, az - bz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    share = length * (wa + wb)
+    scale = (length - rest_length) / share if share > 0.0 else 0.0
+    ua, ub = wa * scale, wb * scale
+    return ax - ua * dx, ay - ua * dy, az - ua * dz, bx + ub * dx, by + ub * dy, bz + ub * dz

@@ -8,16 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from weathercoat.deform.sweeps import (
-    Constraints,
-    DeformParameters,
-    Residual,
-    deform,
-    follow_events,
-    make_constraints,
-    measure_residual,
-    release,
-)
+from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
+from weathercoat.deform.deformation import DeformParameters, Residual, deform, measure_residual
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import find_separating, separate
@@ -105,7 +97,7 @@ class Simulation:
 
         fallen = flake(self.mesh, self.film, self.film_parameters, age, len(separating), self.log)
         self.flake_areas.extend(fallen.tolist())
-        follow_events(self.constraints, self.log)
+        follow_events(self.mesh, self.constraints, self.log)
         decided = time.perf_counter()
 
         deform(self.mesh, self.constraints, self.deform_parameters, age)

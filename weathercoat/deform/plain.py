@@ -1,0 +1,158 @@
+"""The same sweeps in plain form, one constraint after another, from the definition of what is active.
+
+Nothing in a run uses it: tests hold the packed sweeps against it, bit for bit, and the benchmark times it
+beside them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from weathercoat.compile import kernel
+from weathercoat.deform.angle import DIHEDRAL, FORMS, meet_angle
+from weathercoat.deform.constraints import Constraints
+from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.length import meet_length
+from weathercoat.deform.substrate import stay_above
+from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
+from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
+from weathercoat.mesh.surface import Indices, Vectors
+
+
+class Active(NamedTuple):
+    """What is active, in the order in which it is met.
+
+    ends: int32 (l, 2), with rest_length (l,); hinges: int32 (a, 4), with their half-edges (a,); free: int32
+    (v,), film vertices that may move, ascending.
+    """
+
+    ends: Indices
+    rest_length: Vectors
+    hinges: Indices
+    hinge_edges: Indices
+    free: Indices
+
+
+def find_active(mesh: HalfEdgeMesh, constraints: Constraints) -> Active:
+    """The active constraints by their definition, in the order of their slots."""
+    tail, twin, mass = mesh.tail, mesh.twin, constraints.inverse_mass
+    ends, edges, hinges, hinge_edges = [], [], [], []
+    for h in constraints.lengths.half_edge.tolist():
+        pair = tail[h], tail[next_of(h)]
+        if mesh.alive[h // 3] and not 0 <= twin[h] < h and mass[pair[0]] + mass[pair[1]] > 0.0:
+            ends.append(pair)
+            edges.append(h)
+    for h in constraints.angles.half_edge.tolist():
+        g = twin[h]
+        if mesh.alive[h // 3] and g >= 0 and not math.isnan(constraints.angle_start[h]):
+            hinges.append((tail[h], tail[next_of(h)], tail[prev_of(h)], tail[prev_of(g)]))
+            hinge_edges.append(h)
+    used = np.arange(mesh.vertex_count)
+    return Active(
+        np.array(ends, np.int32).reshape(-1, 2),
+        constraints.rest_length[edges],
+        np.array(hinges, np.int32).reshape(-1, 4),
+        np.array(hinge_edges, np.int32),
+        used[(mass[used] > 0.0) & (mesh.half_edge[used] >= 0)].astype(np.int32),
+    )
+
+
+def deform_plainly(
+    mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float
+) -> None:
+    """What `deform` does, from the definition of what is active."""
+    active = find_active(mesh, constraints)
+    target = bends_wanted(constraints, active.hinge_edges, parameters, age)
+    form = FORMS[parameters.deformation_angle]
+    if form == DIHEDRAL:
+        half_tangents(target)
+    for _ in range(parameters.deformation_sweeps):
+        sweep_plainly(
+            mesh, constraints.inverse_mass, active, form, target, parameters.deformation_angle_stiffness
+        )
+
+
+def sweep_plainly(
+    mesh: HalfEdgeMesh, inverse_mass: Vectors, active: Active, form: int, target: Vectors, stiffness: float
+) -> None:
+    """One sweep: lengths, angles, substrate; changes positions."""
+    project_lengths(mesh.positions, inverse_mass, active.ends, active.rest_length)
+    project_angles(form, mesh.positions, inverse_mass, active.hinges, target, stiffness)
+    lift_to_substrate(mesh.positions, mesh.origin, mesh.rest_positions, mesh.rest_normals, active.free)
+
+
+def bends_wanted(
+    constraints: Constraints, half_edges: Indices, parameters: DeformParameters, age: float
+) -> Vectors:
+    """The bends that the hinges of half-edges (k,) are to have at an age [rad], (k,)."""
+    p = parameters
+    bends = np.empty(len(half_edges))
+    by_curvature = p.curl_rule == "curvature"
+    rate = p.curl_rate if by_curvature else p.curl_angle_rate
+    start, since = constraints.angle_start[half_edges], constraints.angle_age[half_edges]
+    span = constraints.span[half_edges]
+    _bends_wanted(by_curvature, start, age - since, span, p.curl_radius, rate, p.curl_angle_floor, bends)
+    return bends
+
+
+@kernel
+def _bends_wanted(
+    by_curvature: bool, start: Vectors, elapsed: Vectors, span: Vectors, radius: float, rate: float,
+    floor: float, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(out)):
+        if by_curvature:
+            out[i] = curved_bend(start[i], span[i], radius, share_grown(rate * elapsed[i]))
+        else:
+            out[i] = shrunk_bend(start[i], rate * elapsed[i], floor)
+
+
+@kernel
+def half_tangents(angles: Vectors) -> None:
+    """Replace each angle by the tangent of its half."""
+    for i in range(len(angles)):
+        angles[i] = half_tangent(angles[i])
+
+
+@kernel
+def project_lengths(positions: Vectors, inverse_mass: Vectors, ends: Indices, rest_length: Vectors) -> None:
+    """Meet each of the lengths (k,) of ends (k, 2), in order; changes positions."""
+    for i in range(len(ends)):
+        a, b = ends[i, 0], ends[i, 1]
+        moved = meet_length(
+            positions[a, 0], positions[a, 1], positions[a, 2],
+            positions[b, 0], positions[b, 1], positions[b, 2],
+            inverse_mass[a], inverse_mass[b], rest_length[i],
+        )  # fmt: skip
+        for axis in range(3):
+            positions[a, axis] = moved[axis]
+            positions[b, axis] = moved[3 + axis]
+
+
+@kernel
+def project_angles(
+    form: int, positions: Vectors, inverse_mass: Vectors, hinges: Indices, target: Vectors, stiffness: float
+) -> None:
+    """Bring each of the hinges (k, 4) towards its target (k,) by a form, in order; changes positions."""
+    gradient = np.empty((4, 3))
+    for i in range(len(hinges)):
+        w = inverse_mass[hinges[i]]
+        meet_angle(form, positions, hinges[i], w[0], w[1], w[2], w[3], target[i], stiffness, gradient)
+
+
+@kernel
+def lift_to_substrate(
+    positions: Vectors, origin: Indices, rest_positions: Vectors, rest_normals: Vectors, vertices: Indices
+) -> None:
+    """Put each of the vertices (k,) below its plane back on it; changes positions."""
+    for v in vertices:
+        o = origin[v]
+        n, p = rest_normals[o], rest_positions[o]
+        offset = n[0] * p[0] + n[1] * p[1] + n[2] * p[2]
+        x, y, z = stay_above(
+            positions[v, 0], positions[v, 1], positions[v, 2], n[0], n[1], n[2], offset
+        )  # fmt: skip
+        positions[v, 0], positions[v, 1], positions[v, 2] = x, y, z
