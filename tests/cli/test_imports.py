@@ -29,6 +29,8 @@ print("LOADED", code, *loaded)
         ["remesh", "--help"],
         ["inspect", "--help"],
         ["render", "--help"],
+        ["bench", "--help"],
+        ["bench", "speed", "--help"],
         ["completion", "fish"],
         ["run", "--frob"],
     ],

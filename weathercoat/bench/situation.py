@@ -5,6 +5,7 @@ about.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,9 +36,9 @@ class Load:
     lost_share: float
 
 
-def load_speed_config(steps: int = 1000) -> Config:
-    """The config of the benchmark, its run divided into `steps` steps."""
-    return load_config(CONFIG, [Override("ageing.steps", steps, "--steps")]).config
+def load_speed_config(steps: int = 1000, overrides: Sequence[str] = ()) -> Config:
+    """The config of the benchmark, its run divided into `steps` steps; overrides: `key=value`."""
+    return load_config(CONFIG, [Override("ageing.steps", steps, "--steps"), *overrides]).config
 
 
 def make_speed_simulation(surface: Surface, config: Config) -> Simulation:

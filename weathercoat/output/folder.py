@@ -39,14 +39,15 @@ class RunFolder:
 
     The temporary folder lies beside the target, hence on its file system, and is removed on any exception. An
     existing target is refused with OutputExistsError before any work; with `overwrite` it is replaced at the
-    end, and only if it is the folder of a run, or empty. OutputError where the target cannot be written, also
-    for a write that fails inside the block because the disk is full. A process that is killed outright leaves
-    `.weathercoat-*.partial` beside the target.
+    end, and only if it holds the file `marker`, as the folder of a run does, or nothing. OutputError where
+    the target cannot be written, also for a write that fails inside the block because the disk is full. A
+    process that is killed outright leaves `.weathercoat-*.partial` beside the target.
     """
 
-    def __init__(self, target: Path | str, *, overwrite: bool = False) -> None:
+    def __init__(self, target: Path | str, *, overwrite: bool = False, marker: str = REPORT) -> None:
         self.target = _resolved(target)
         self.overwrite = overwrite
+        self.marker = marker
         self._check_target()
         self._check_parent()
 
@@ -75,10 +76,10 @@ class RunFolder:
         if not self.overwrite:
             raise OutputExistsError("the folder exists", file=str(self.target))
         with _output_errors(self.target):
-            is_run = (self.target / REPORT).is_file() or not any(self.target.iterdir())
+            is_run = (self.target / self.marker).is_file() or not any(self.target.iterdir())
         if not is_run:
             raise OutputError(
-                f"holds no {REPORT}, so it is not overwritten",
+                f"holds no {self.marker}, so it is not overwritten",
                 file=str(self.target),
                 remedy="choose another folder",
             )

@@ -1,0 +1,82 @@
+"""`weathercoat bench`: measure this machine and this version."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from weathercoat.cli import options
+from weathercoat.cli.messages import Messages
+from weathercoat.errors import UsageError
+
+
+@click.group()
+def command() -> None:
+    """Measure how fast it is."""
+
+
+@command.command("speed")
+@click.argument("meshes", metavar="[MESH]...", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--faces",
+    metavar="N,N,...",
+    help="Sizes of the generated plates, or none. Default: 3000,10000,100000,300000,1000000.",
+)
+@click.option("--steps", type=int, default=1000, show_default=True, metavar="N", help="Steps of a run.")
+@click.option("--repeats", type=int, default=3, show_default=True, metavar="N", help="Runs of each case.")
+@options.output("Folder for speed.json, speed.csv and speed.png; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def speed(
+    meshes: tuple[Path, ...],
+    faces: str | None,
+    steps: int,
+    repeats: int,
+    output: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Time 1,000 steps on each MESH as it is, and on generated plates, stage by stage.
+
+    The situation is fixed: 60 % of the vertices separate and 2,000 edges break on 10,000 faces, both evenly.
+    Each case runs in a process of its own, on one core. Of long runs a few steps are timed in each tenth.
+    """
+    from weathercoat.bench.cases import FACES
+    from weathercoat.bench.files import RESULTS, write_results
+    from weathercoat.bench.speed import bench_speed
+    from weathercoat.bench.tables import as_text
+    from weathercoat.output.folder import RunFolder
+
+    plates = FACES if faces is None else _parse_faces(faces)
+    folder = None if output is None else RunFolder(output, overwrite=overwrite, marker=RESULTS)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_speed(
+            meshes, plates, steps=steps, repeats=repeats, progress=messages.progress, say=messages.log
+        )
+        if folder is not None:
+            with folder as path:
+                missing = write_results(path, results)
+            if missing:
+                messages.log(missing)
+    if as_json:
+        click.echo(json.dumps(results, indent=2, ensure_ascii=False))
+    elif not quiet:
+        click.echo("\n".join(as_text(results)))
+        if output is not None:
+            click.echo(f"written to {output}")
+
+
+def _parse_faces(text: str) -> tuple[int, ...]:
+    if text == "none":
+        return ()
+    try:
+        return tuple(int(part) for part in text.replace("_", "").split(","))
+    except ValueError:
+        raise UsageError(
+            f"--faces: {text!r} is no list of whole numbers", remedy="write them as 3000,10000"
+        ) from None
