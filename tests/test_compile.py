@@ -1,44 +1,245 @@
-"""Where compiled kernels are kept, and what happens where they cannot be."""
+"""Where compiled kernels are kept, that they are found again, and what happens where they cannot be."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from weathercoat.compile import is_writable
+import weathercoat
+from weathercoat.compile import cache_folder, kernel, remove_unused, watch_compiling
 
-TRIAL = "from weathercoat.film.noise import perlin, PERMUTATION; print(perlin(3.14, 42.0, 7.0, PERMUTATION))"
+VALUE = 0.13691995878400012
+TRIAL = """
+from weathercoat.compile import watch_compiling
+from weathercoat.film.noise import perlin, PERMUTATION
+with watch_compiling(lambda: None) as compiling:
+    print(perlin(3.14, 42.0, 7.0, PERMUTATION), compiling.kernels)
+"""
+SOURCES = Path(weathercoat.__file__).parent
+DAY = 86_400.0
 
 
-def test_a_folder_is_made_where_it_can_be(tmp_path: Path) -> None:
-    assert is_writable(tmp_path / "a" / "b") and (tmp_path / "a" / "b").is_dir()
-    (tmp_path / "file").touch()
-    assert not is_writable(tmp_path / "file" / "c")
-    assert not is_writable(Path("~/cache"))
+def environment(**changes: object) -> dict[str, str]:
+    """That of this process without places for caches, and with `changes`."""
+    places = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
+    kept = {key: value for key, value in os.environ.items() if key not in places}
+    added = {key: str(value) for key, value in changes.items()}
+    return {**kept, "PYTHONPATH": str(SOURCES.parent), "PYTHONDONTWRITEBYTECODE": "1", **added}
+
+
+def try_kernel(cwd: Path, **changes: object) -> int:
+    """Call a kernel in a process of its own; returns how many were compiled."""
+    done = subprocess.run(
+        [sys.executable, "-c", TRIAL],
+        env=environment(**changes),
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    value, compiled = done.stdout.split()
+    assert float(value) == pytest.approx(VALUE, abs=1e-15)
+    return int(compiled)
+
+
+def files_below(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def test_kernels_are_kept_and_mended(tmp_path: Path) -> None:
+    """Compiled once; a file that is cut short, as by a crash, is no kernel and is written anew."""
+    assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) > 1
+    assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) == 0
+    (kept,) = tmp_path.rglob("perlin-*.kernel")
+    whole = kept.stat().st_size
+    kept.write_bytes(kept.read_bytes()[: whole // 2])
+    assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) >= 1
+    assert kept.stat().st_size == whole
+    assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) == 0
+
+
+def test_a_change_of_an_imported_source_is_noticed(tmp_path: Path) -> None:
+    """A kernel is compiled anew when its module or one that it imports changes, and by its content alone."""
+    site, caches = tmp_path / "site", tmp_path / "caches"
+    shutil.copytree(SOURCES, site / "weathercoat", ignore=shutil.ignore_patterns("__pycache__"))
+    places = {"PYTHONPATH": site, "NUMBA_CACHE_DIR": caches}
+    assert try_kernel(tmp_path, **places) > 1
+    for path in site.rglob("*.py"):
+        path.touch()
+    assert try_kernel(tmp_path, **places) == 0
+    with (site / "weathercoat" / "compile.py").open("a") as stream:
+        stream.write("# changed\n")
+    assert try_kernel(tmp_path, **places) > 1
 
 
 @pytest.mark.parametrize("place", ["file", "no home"])
 def test_kernels_run_without_a_place_to_keep_them(tmp_path: Path, place: str) -> None:
     """Where the cache folder cannot be made, each process compiles what it needs."""
     (tmp_path / "file").touch()
-    environment = {key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "HOME")}
-    environment["PYTHONPATH"] = str(Path(__file__).parent.parent)
-    if place == "file":
-        environment["XDG_CACHE_HOME"] = str(tmp_path / "file")
-    else:
-        environment.pop("XDG_CACHE_HOME", None)
-        environment["HOME"] = str(tmp_path / "file")
-    run = subprocess.run(
-        [sys.executable, "-c", TRIAL],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
+    changes = {"XDG_CACHE_HOME" if place == "file" else "HOME": tmp_path / "file"}
+    assert try_kernel(tmp_path, **changes) > 1
+    assert files_below(tmp_path) == ["file"]
+
+
+def test_nothing_is_written_where_the_package_is_installed(tmp_path: Path) -> None:
+    site, home = tmp_path / "site", tmp_path / "home"
+    shutil.copytree(SOURCES, site / "weathercoat", ignore=shutil.ignore_patterns("__pycache__"))
+    home.mkdir()
+    folders = [site, *(path for path in site.rglob("*") if path.is_dir())]
+    before = files_below(site)
+    for folder in folders:
+        folder.chmod(0o555)
+    try:
+        assert try_kernel(home, PYTHONPATH=site, HOME=home) > 1
+        assert try_kernel(home, PYTHONPATH=site, HOME=home) == 0
+    finally:
+        for folder in folders:
+            folder.chmod(0o755)
+    assert files_below(site) == before
+    assert {path.parts[0] for path in map(Path, files_below(home))} == {".cache"}
+
+
+@pytest.fixture
+def caches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty folder as the place of all modules' kernels."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    folder = cache_folder()
+    assert folder is not None
+    folder.mkdir(parents=True)
+    yield folder
+
+
+def make_aged(folder: Path, days: float) -> Path:
+    folder.mkdir()
+    (folder / "perlin-0123456789abcdef.kernel").touch()
+    os.utime(folder, (time.time() - days * DAY,) * 2)
+    return folder
+
+
+def test_kernels_that_nobody_uses_go(caches: Path) -> None:
+    make_aged(caches / "film.noise-0123456789abcdef", 31)
+    kept = [
+        make_aged(caches / "film.noise-fedcba9876543210", 29),
+        make_aged(caches / "film.noise", 31),
+        make_aged(caches / "another tool's", 31),
+    ]
+    assert remove_unused() == 1
+    assert sorted(caches.iterdir()) == sorted(kept)
+
+
+def test_kernels_in_use_stay(caches: Path) -> None:
+    """Use renews the date."""
+    given = os.environ["NUMBA_CACHE_DIR"]
+    assert try_kernel(caches, NUMBA_CACHE_DIR=given) > 1
+    folders = list(caches.iterdir())
+    for folder in folders:
+        os.utime(folder, (time.time() - 40 * DAY,) * 2)
+    assert try_kernel(caches, NUMBA_CACHE_DIR=given) == 0
+    assert remove_unused() == 0
+    assert sorted(caches.iterdir()) == sorted(folders)
+
+
+def test_compiling_is_watched() -> None:
+    """Each kernel counts once, those that it calls too; `begun` is called before the first and no more."""
+
+    @kernel
+    def inner(x: float) -> float:
+        return 2.0 * x
+
+    @kernel
+    def outer(x: float) -> float:
+        return inner(x) + 1.0
+
+    begun: list[bool] = []
+    started = time.perf_counter()
+    with watch_compiling(lambda: begun.append(True)) as compiling:
+        assert outer(1.0) == 3.0
+        assert (compiling.kernels, len(begun)) == (2, 1)
+        outer(2.0)
+        outer(1)
+    assert (compiling.kernels, len(begun)) == (4, 1)
+    assert 0.0 < compiling.seconds < time.perf_counter() - started
+    with watch_compiling(lambda: begun.append(True)) as compiling:
+        outer(3.0)
+    assert (compiling.kernels, compiling.seconds, len(begun)) == (0, 0.0, 1)
+
+
+def weathercoat_command(*arguments: object, cwd: Path, cache: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "weathercoat", *map(str, arguments)],
+        env=environment(NUMBA_CACHE_DIR=cache),
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=True,
     )
-    assert float(run.stdout) == pytest.approx(0.13691995878400012, abs=1e-15)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file"]
+
+
+SMALL = [
+    *("--set", "remesh.faces=500"),
+    *("--set", "ageing.steps=20"),
+    *("--set", "snapshots.count=2"),
+    *("--set", "output.picture_width=64"),
+    *("--set", "output.picture_height=48"),
+]
+
+
+@pytest.mark.long
+def test_first_runs_at_once_do_not_trip_each_other(tmp_path: Path) -> None:
+    """Two runs compile into one empty place at once: the same bytes, those of a later run that finds them."""
+    assert weathercoat_command("sample", "sign", cwd=tmp_path, cache=tmp_path / "other").wait() == 0
+    cache = tmp_path / "cache"
+
+    def run(name: str) -> subprocess.Popen[str]:
+        return weathercoat_command(
+            "run", "standard", "sign.obj", "-o", name, *SMALL, cwd=tmp_path, cache=cache
+        )
+
+    for process in [run("a"), run("b")]:
+        _, said = process.communicate()
+        assert process.returncode == 0, said
+        assert "weathercoat: compiling" in said and "weathercoat: compiled" in said
+    _, said = run("c").communicate()
+    assert "compil" not in said
+    for other in ("b", "c"):
+        assert files_below(tmp_path / "a") == files_below(tmp_path / other)
+        for path in (tmp_path / "a").rglob("*.*"):
+            if path.name != "timing.json":
+                twin = tmp_path / other / path.relative_to(tmp_path / "a")
+                assert path.read_bytes() == twin.read_bytes(), path.name
+    assert not list(cache.rglob("tmp*")), "half-written files are left"
+
+
+@pytest.mark.long
+def test_nothing_is_left_to_compile_after_the_warm_up(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+
+    def call(*arguments: object) -> str:
+        process = weathercoat_command(*arguments, cwd=tmp_path, cache=cache)
+        printed, said = process.communicate()
+        assert process.returncode == 0, said
+        return printed + said
+
+    assert '"kernels": 0' not in call("warmup", "--json")
+    assert '"kernels": 0' in call("warmup", "--json")
+    call("sample", "sign")
+    call("sample", "gear")
+    commands: list[list[object]] = [
+        ["run", name, "sign.obj", "-o", name, *SMALL]
+        for name in ("standard", "literal", "crackle", "curling", "rusting")
+    ]
+    commands += [
+        ["run", "standard", "gear.obj", "-o", "gear", *SMALL, "--set", "remesh=off"],
+        ["remesh", "sign.obj", "-o", "remeshed.ply", "--faces", 3000],
+        ["inspect", "remeshed.ply", "--self-intersections"],
+        ["render", "standard", "-o", "standard.png"],
+    ]
+    for arguments in commands:
+        assert "compil" not in call(*arguments), arguments

@@ -1,9 +1,12 @@
 """`kernel`: how every compiled function of the package is declared, and where its machine code is kept.
 
-Numba's disk cache does not notice changes in functions that a kernel calls from another file, so the kernels
-of each module are kept in a folder keyed by a hash of the sources that the module is made from: its own and
-those of all modules of the package that it imports, directly or not. Numba itself keys by CPU. The folders
-lie in the user's cache directory, so that a package which is installed read-only caches as well;
+Numba's own disk cache does not notice changes in functions that a kernel calls from another file, and two
+processes that compile at once can overwrite each other's entries. So each kernel is a file of its own, named
+by a hash of what it was made from (its signature, the processor, the versions of Python and Numba), in a
+folder named by a hash of the sources that its module is made from: its own and those of all modules of the
+package that it imports, directly or not. A file appears whole; who writes it last changes nothing.
+
+The folders lie in the user's cache directory, so that a package which is installed read-only caches as well;
 `NUMBA_CACHE_DIR` names another place.
 """
 
@@ -11,24 +14,60 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import re
-from collections.abc import Callable
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import NamedTemporaryFile, mkdtemp
 from typing import Any
+
+import numba
+import numba.core.event
+import numba.np.linalg
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+
+def _take_blas_for_granted() -> None:
+    """Spare the start the import of SciPy's linear algebra, a fifth of a second.
+
+    Numba imports it with its array functions only to learn whether it is there, which it is since we depend
+    on it; a function that needs it, and none here does, looks again.
+    """
+    if "numba.np.arraymath" in sys.modules:
+        return
+    look = numba.np.linalg.ensure_blas
+    numba.np.linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        numba.np.linalg.ensure_blas = look
+
+
+_take_blas_for_granted()
 
 _PACKAGE = Path(__file__).parent
 _IMPORT = re.compile(rb"^\s*(?:from|import) weathercoat\.([\w.]+)", re.MULTILINE)
+_FOLDER = re.compile(r"[\w.]+-[0-9a-f]{16}")
+_DAY = 86_400.0
+_DAYS_KEPT = 30
 
 
-def cache_folder() -> Path:
-    """The folder that holds the folders of all modules' kernels."""
+def cache_folder() -> Path | None:
+    """The folder that holds the folders of all modules' kernels; None without a home."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
-        return Path(given)
+        return Path(given) / "weathercoat"
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 (without a home too)
-    return Path(base) / "weathercoat" / "kernels"
+    return None if base.startswith("~") else Path(base) / "weathercoat" / "kernels"
 
 
 @cache
@@ -39,7 +78,7 @@ def _source(module: str) -> bytes:
 
 
 @cache
-def kernel_folder(module: str) -> Path:
+def kernel_folder(module: str) -> Path | None:
     """The folder for the kernels of a module, by its name below the package: `film.lift`."""
     made_from = {module}
     unread = [module]
@@ -52,30 +91,103 @@ def kernel_folder(module: str) -> Path:
     digest = hashlib.sha256()
     for name in sorted(made_from):
         digest.update(name.encode() + b"\0" + _source(name) + b"\0")
-    return cache_folder() / f"{module}-{digest.hexdigest()[:16]}"
+    base = cache_folder()
+    return base and base / f"{module}-{digest.hexdigest()[:16]}"
 
 
-def is_writable(folder: Path) -> bool:
-    """Whether compiled kernels can be kept in `folder`, which is made where it does not exist."""
-    if folder.parts[:1] == ("~",):  # there is no home
-        return False
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
+class _KernelCache(NullCache):  # type: ignore[misc]
+    """Keeps the machine code of one function, for Numba."""
+
+    def __init__(self, function: Callable[..., Any], module: str) -> None:
+        self._function = function
+        self._module = module
+
+    def _path(self, signature: object, codegen: Any) -> Path | None:
+        folder = kernel_folder(self._module)
+        made_from = (signature, codegen.magic_tuple(), numba.__version__, sys.version)
+        digest = hashlib.sha256(repr(made_from).encode()).hexdigest()[:16]
+        return folder and folder / f"{self._function.__name__}-{digest}.kernel"
+
+    def load_overload(self, sig: object, target_context: Any) -> CompileResult | None:
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        if path is None:
+            return None
+        # Compiling anew mends whatever is wrong with a file.
+        with suppress(Exception):
+            loaded = CompileResult._rebuild(target_context, *pickle.loads(path.read_bytes()))
+            _mark_used(path.parent)
+            return loaded
+        return None
+
+    def save_overload(self, sig: object, data: CompileResult) -> None:
+        path = self._path(sig, data.codegen)
+        if path is None:
+            return
+        # Without a place, each run compiles what it needs.
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with NamedTemporaryFile(dir=path.parent, delete=False) as stream:
+                stream.write(dumps(data._reduce()))
+            Path(stream.name).replace(path)
 
 
-# Numba refuses to declare a function whose cache has no place; without one, each run compiles anew.
-_CAN_CACHE = is_writable(cache_folder())
+@cache
+def _mark_used(folder: Path) -> None:
+    """Renew the date of a folder that is to be kept, at most once a day."""
+    if time.time() - folder.stat().st_mtime > _DAY:
+        os.utime(folder)
 
-import numba  # noqa: E402  (after the environment was read)
+
+def remove_unused() -> int:
+    """Remove the kernels of other versions that no run has used for 30 days; returns how many folders."""
+    base = cache_folder()
+    removed = 0
+    if base is None or not base.is_dir():
+        return removed
+    for folder in base.iterdir():
+        with suppress(OSError):
+            if _FOLDER.fullmatch(folder.name) and time.time() - folder.stat().st_mtime > _DAYS_KEPT * _DAY:
+                # first out of the way of processes that would look for it
+                shutil.rmtree(folder.rename(Path(mkdtemp(dir=base)) / folder.name).parent)
+                removed += 1
+    return removed
 
 
-def is_cold() -> bool:
-    """Whether no kernel has been kept yet, so that the next run takes longer."""
-    return next(cache_folder().rglob("*.nbi"), None) is None
+@dataclass
+class Compiling(numba.core.event.Listener):  # type: ignore[misc]
+    """What was compiled: the number of kernels and the seconds that it took. `begun` is called before the
+    first.
+    """
+
+    begun: Callable[[], None]
+    kernels: int = 0
+    seconds: float = 0.0
+    _depth: int = 0
+    _started: float = 0.0
+
+    def on_start(self, event: numba.core.event.Event) -> None:
+        """Kernels are compiled within the kernels that call them; the outermost one's time counts."""
+        if self._depth == 0:
+            self._started = time.perf_counter()
+            if self.kernels == 0:
+                self.begun()
+        self._depth += 1
+        self.kernels += 1
+
+    def on_end(self, event: numba.core.event.Event) -> None:
+        """The end of what began last."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._started
+
+
+@contextmanager
+def watch_compiling(begun: Callable[[], None]) -> Iterator[Compiling]:
+    """Watch what the block compiles; `begun` is called before the first kernel."""
+    compiling = Compiling(begun)
+    with numba.core.event.install_listener("numba:compile", compiling):
+        yield compiling
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -83,10 +195,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     It runs without the interpreter's lock, so that threads can share work.
     """
+    compiled = numba.njit(fastmath=False, error_model="numpy", nogil=True)(function)
     package, _, module = function.__module__.partition(".")
-    numba.config.CACHE_DIR = str(kernel_folder(module))  # type: ignore[attr-defined]
-    can_cache = _CAN_CACHE and package == __name__.partition(".")[0]
-    return numba.njit(cache=can_cache, fastmath=False, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    if package == __name__.partition(".")[0]:
+        compiled._cache = _KernelCache(function, module)  # type: ignore[attr-defined]
+    return compiled  # type: ignore[no-any-return]
 
 
 def formula(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
-from weathercoat.compile import is_cold
+from weathercoat.compile import Compiling, remove_unused, watch_compiling
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.deform.deformation import DeformParameters
@@ -87,8 +87,7 @@ def run_asset(
     config = loaded.config
     say = log or (lambda line: None)
     watch = Stopwatch()
-    with run_folder.RunFolder(out, overwrite=overwrite) as folder:
-        announce_compiling(say)
+    with report_compiling(say), run_folder.RunFolder(out, overwrite=overwrite) as folder:
         with watch.time("read"):
             surface, inputs = _read(model, format, config)
         name = next(iter(inputs))
@@ -138,10 +137,18 @@ def _read(model: str | Path | BinaryIO, format: str | None, config: Config) -> t
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
 
 
-def announce_compiling(say: Callable[[str], None]) -> None:
-    """Explain the wait where the kernels are not compiled yet."""
-    if is_cold():
-        say("compiling on this first run, which takes about a minute; later runs start at once")
+@contextmanager
+def report_compiling(say: Callable[[str], None]) -> Iterator[Compiling]:
+    """Explain the wait where the block compiles kernels, and say how long it took; kernels of other versions
+    that nobody has used for a month go.
+    """
+    with watch_compiling(
+        lambda: say("compiling, which takes up to a minute after an installation; later runs start at once")
+    ) as compiling:
+        yield compiling
+    if compiling.kernels:
+        say(f"compiled {compiling.kernels} kernels in {compiling.seconds:.1f} s")
+        remove_unused()
 
 
 @contextmanager

@@ -61,7 +61,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["--help"]) == 0
     out = capsys.readouterr().out
     commands = out.partition("Commands:")[2]
-    for name in ("run", "config", "sample", "inspect", "remesh", "render", "bench", "completion"):
+    for name in ("run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion"):
         assert f"  {name} " in commands
 
 
@@ -308,7 +308,10 @@ def test_completion_scripts_call_back(shell: str, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("weathercoat ", {"run", "config", "sample", "inspect", "remesh", "render", "bench", "completion"}),
+        (
+            "weathercoat ",
+            {"run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion"},
+        ),
         ("weathercoat run cr", {"crackle"}),
         ("weathercoat run crackle a.obj --set curl.ra", {"curl.radius=", "curl.rate="}),
         ("weathercoat sample b", {"barrel", "box", "bracket"}),

@@ -31,6 +31,7 @@ print("LOADED", code, *loaded)
         ["render", "--help"],
         ["bench", "--help"],
         ["bench", "speed", "--help"],
+        ["warmup", "--help"],
         ["completion", "fish"],
         ["run", "--frob"],
     ],

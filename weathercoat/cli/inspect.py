@@ -31,13 +31,16 @@ def command(
 ) -> None:
     """Tell the faces, components, boundary and manifoldness of MODEL, its repairs, and the cost of a run."""
     from weathercoat.cli.cost import estimate_cost
+    from weathercoat.cli.messages import Messages
     from weathercoat.cli.reading import read_model
     from weathercoat.config.load import load_config
     from weathercoat.mesh.inspect import inspect_surface
+    from weathercoat.run import report_compiling
 
     loaded = load_config(config, assignments)
-    surface = read_model(model, model_format, up=loaded.config.model.up)
-    found = inspect_surface(surface, self_intersections=self_intersections)
+    with Messages(quiet=as_json) as messages, report_compiling(messages.log):
+        surface = read_model(model, model_format, up=loaded.config.model.up)
+        found = inspect_surface(surface, self_intersections=self_intersections)
     cost = estimate_cost(loaded.config, len(surface.faces))
     found["run_cost"] = {"seconds": round(cost.seconds, 1), "memory_mb": round(cost.memory / 1e6)}
     if as_json:

@@ -53,16 +53,16 @@ def command(
     from weathercoat.cli.reading import read_model
     from weathercoat.mesh.remesh import RemeshParameters, remesh
     from weathercoat.output.report import measure_surface
-    from weathercoat.run import announce_compiling, name_errors, report_notes
+    from weathercoat.run import name_errors, report_compiling, report_notes
 
     if as_json and output == STANDARD_OUTPUT:
         raise UsageError("--json and -o - both write to standard output", remedy="give a file to -o")
     with (
         Messages(quiet=quiet or as_json) as messages,
+        report_compiling(messages.log),
         open_mesh(output, overwrite=overwrite) as write,
         name_errors(model),
     ):
-        announce_compiling(messages.log)
         surface = read_model(model, model_format)
         report_notes(surface.notes, model, messages.log)
         result = remesh(surface, RemeshParameters(faces=faces, crease_angle=crease_angle, seed=seed))

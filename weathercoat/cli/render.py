@@ -30,10 +30,16 @@ if TYPE_CHECKING:
 @options.debug
 def command(run: Path, output: Path, step: int | None, overwrite: bool, **view: float | None) -> None:
     """Draw RUN, the folder of a finished run or its folder of snapshots, as a PNG."""
+    from weathercoat.cli.messages import Messages
     from weathercoat.output.folder import whole_file
     from weathercoat.output.pictures import write_png
+    from weathercoat.run import report_compiling
 
-    with whole_file(output, overwrite=overwrite) as stream:
+    with (
+        Messages(quiet=False) as messages,
+        report_compiling(messages.log),
+        whole_file(output, overwrite=overwrite) as stream,
+    ):
         image = _draw(run, step, {name: value for name, value in view.items() if value is not None})
         write_png(stream, image)  # type: ignore[arg-type]
     click.echo(f"written to {output}")

@@ -12,7 +12,7 @@ import click
 
 from weathercoat import __version__
 
-_SUBCOMMANDS = ("run", "config", "sample", "inspect", "remesh", "render", "bench", "completion")
+_SUBCOMMANDS = ("run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion")
 
 
 class _Subcommands(click.Group):

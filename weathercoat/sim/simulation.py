@@ -67,8 +67,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         self.log = make_event_log(len(self.mesh.faces))
-        tick = self.duration / self.steps
-        self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP, tick)
+        self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
 
     @property
     def age(self) -> float:
@@ -105,7 +104,7 @@ class Simulation:
 
         rust_room.follow_events(self.mesh, self.rust, self.log, age)
         runoff_room.follow_events(self.mesh, self.rust, self.runoff, self.log)
-        runoff_room.run_off(self.mesh, self.rust, self.runoff)
+        runoff_room.run_off(self.mesh, self.rust, self.runoff, tick)
         self.seconds["failure"] += decided - started
         self.seconds["deformation"] += deformed - decided
         self.seconds["stains"] += time.perf_counter() - deformed

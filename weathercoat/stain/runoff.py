@@ -76,9 +76,10 @@ class Changes(NamedTuple):
 
 @dataclass
 class Runoff:
-    """What follows from mesh and rust for ticks of `duration`, with `up` (3,) against gravity.
+    """What follows from mesh and rust, with `up` (3,) against gravity.
 
-    height: (n0,) of rest vertices [sizes]; `spare` is where the next lists are made.
+    duration: of the tick that the lists are for, 0 before the first; height: (n0,) of rest vertices [sizes];
+    spare: where the next lists are made.
     """
 
     parameters: StainParameters
@@ -90,9 +91,7 @@ class Runoff:
     spare: Lists
 
 
-def make_runoff(
-    mesh: HalfEdgeMesh, rust: RustState, parameters: StainParameters, up: Vectors, duration: float
-) -> Runoff:
+def make_runoff(mesh: HalfEdgeMesh, rust: RustState, parameters: StainParameters, up: Vectors) -> Runoff:
     """Runoff for the state as it is; make it anew after a change of the state that no log tells."""
     capacity, count = len(mesh.twin), mesh.vertex_count
     p = mesh.rest_positions
@@ -108,7 +107,7 @@ def make_runoff(
     stale[: len(running)] = running
     counts = np.array([len(running), len(running), 0])
     changes = Changes(rank.astype(np.int64), is_running, is_running.copy(), new, stale, counts)
-    return Runoff(parameters, up, duration, height, changes, _make_lists(256), _make_lists(256))
+    return Runoff(parameters, up, 0.0, height, changes, _make_lists(256), _make_lists(256))
 
 
 def _make_lists(room: int) -> Lists:
@@ -131,17 +130,30 @@ def follow_events(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff, log: Even
         _update_lists(mesh, rust, runoff)
 
 
-def run_off(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff) -> None:
-    """Let sources grow and rust run for a tick, from the highest vertex to the lowest.
+def run_off(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff, duration: float) -> None:
+    """Let sources grow and rust run for a tick of `duration`, from the highest vertex to the lowest.
 
     The neighbour best aligned with gravity along the surface takes over the rust above it, less what fades on
     the way; the other neighbours below take a small share of that.
     """
     changes, p = runoff.changes, runoff.parameters
+    if duration != runoff.duration:
+        runoff.duration = duration
+        _mark_all_stale(runoff)
     if changes.counts[_STALE]:
         _update_lists(mesh, rust, runoff)
     if changes.counts[_RUNNING]:
         _pass_on(runoff.lists, rust.film, mesh.origin, p.rust_threshold, p.rust_source_cap, changes)
+
+
+def _mark_all_stale(runoff: Runoff) -> None:
+    changes = runoff.changes
+    vertices = runoff.lists.order[: changes.counts[_RUNNING]] & _VERTEX
+    vertices = vertices[~changes.is_stale[vertices]]
+    start = changes.counts[_STALE]
+    changes.stale[start : start + len(vertices)] = vertices
+    changes.is_stale[vertices] = True
+    changes.counts[_STALE] += len(vertices)
 
 
 def _update_lists(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff) -> None:

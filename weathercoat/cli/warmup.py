@@ -1,0 +1,92 @@
+"""`weathercoat warmup`: compile ahead what the other commands need, for images and CI."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal, get_args, get_origin
+
+import click
+
+from weathercoat.cli import options
+
+
+@click.command()
+@options.quiet
+@options.as_json
+@options.debug
+def command(quiet: bool, as_json: bool) -> None:
+    """Compile ahead what the other commands need.
+
+    They compile their kernels when they first need them and keep them in the user's cache directory, or below
+    NUMBA_CACHE_DIR. This does so at once, by ageing a small part in each way; it does nothing where all is
+    kept already.
+    """
+    from weathercoat.cli.messages import Messages
+    from weathercoat.compile import cache_folder, remove_unused, watch_compiling
+
+    with (
+        Messages(quiet=quiet or as_json) as messages,
+        watch_compiling(lambda: messages.log("compiling, which takes about a minute")) as compiling,
+    ):
+        _use_everything()
+    remove_unused()
+    folder = cache_folder()
+    if as_json:
+        found = {
+            "kernels": compiling.kernels,
+            "seconds": round(compiling.seconds, 1),
+            "folder": folder and str(folder),
+        }
+        click.echo(json.dumps(found, indent=2, ensure_ascii=False))
+    elif not quiet:
+        what = (
+            f"compiled {compiling.kernels} kernels in {compiling.seconds:.1f} s"
+            if compiling.kernels
+            else "nothing to compile"
+        )
+        click.echo(f"{what}; they are kept in {folder}")
+
+
+def _use_everything() -> None:
+    """Age a small part by every form of every rule, remesh, inspect and draw."""
+    from weathercoat.config.load import load_config
+    from weathercoat.mesh.inspect import inspect_surface
+    from weathercoat.mesh.read import read_surface
+    from weathercoat.mesh.shapes import make_bracket
+    from weathercoat.output.meshes import write_mesh
+    from weathercoat.run import run_asset
+
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        model = folder / "part.obj"
+        write_mesh(model, make_bracket(edge_length=0.2))
+        inspect_surface(read_surface(model), self_intersections=True)
+        small = [
+            "ageing.steps=20",
+            "snapshots.count=1",
+            "output.picture_width=64",
+            "output.picture_height=48",
+        ]
+        for number, form in enumerate(_forms()):
+            remesh = f"remesh.faces={600}" if number == 0 else "remesh=off"
+            loaded = load_config("standard", [*small, remesh, *form])
+            run_asset(loaded, model, folder / f"run_{number}")
+
+
+def _forms() -> Iterator[list[str]]:
+    """Assignments that, between them, choose every form of every rule."""
+    from weathercoat.config.schema import Config, section_of
+
+    choices: dict[str, list[str]] = {}
+    for section_name, section_field in Config.model_fields.items():
+        section = section_of(section_field)
+        if section is None or section_name in ("model", "output"):
+            continue
+        for name, field in section.model_fields.items():
+            if get_origin(field.annotation) is Literal:
+                choices[f"{section_name}.{field.alias or name}"] = list(get_args(field.annotation))
+    for number in range(max(map(len, choices.values()))):
+        yield [f"{key}={forms[number % len(forms)]}" for key, forms in choices.items()]
