@@ -91,12 +91,13 @@ def _do(job: dict[str, Any]) -> dict[str, Any]:
 def _machine() -> dict[str, Any]:
     from weathercoat.bench import machine
     from weathercoat.bench.measure import warm_up
+    from weathercoat.compile import watch_compiling
 
-    kept = machine.kept_kernels()
-    seconds = warm_up()
+    with watch_compiling(lambda: None) as compiling:
+        seconds = warm_up()
     return {
         **machine.describe_machine(),
-        "warm_up": {"seconds": seconds, "compiled_kernels": machine.kept_kernels() - kept},
+        "warm_up": {"seconds": seconds, "compiled_kernels": compiling.kernels},
         "copy_bandwidth": machine.copy_bandwidth(),
         "arithmetic_peak": machine.arithmetic_peak(),
     }

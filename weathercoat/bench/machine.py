@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from weathercoat.bench.peer import peer_version
-from weathercoat.compile import cache_folder, kernel
+from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Vectors
 from weathercoat.output.report import versions
 
@@ -82,11 +82,6 @@ def _reckon(values: Vectors, rounds: int) -> None:
             for _term in range(16):  # _TERMS: a constant, so that it is unrolled
                 x = x * 0.5 + 0.25
             values[i] = x
-
-
-def kept_kernels() -> int:
-    """How many compiled kernels lie in the cache."""
-    return sum(1 for _ in cache_folder().rglob("*.nbc"))
 
 
 def resident_bytes() -> int | None:
