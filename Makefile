@@ -12,13 +12,14 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all lint docs venv dev clean
+.PHONY: help demo test test-all lint docs bench venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
 	@echo "make test      run the tests (make test-all: the long ones too)"
 	@echo "make lint      style, types and import contracts"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
+	@echo "make bench     time it, and put the figures into the documentation"
 	@echo "make clean     remove the environment, the demo and the caches"
 
 venv: .venv/run-$(FINGERPRINT)
@@ -31,6 +32,10 @@ dev: .venv/dev-$(FINGERPRINT)
 
 .venv/dev-$(FINGERPRINT): | .venv/run-$(FINGERPRINT)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+.venv/bench-$(FINGERPRINT): | .venv/run-$(FINGERPRINT)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
 
 demo: venv
@@ -53,6 +58,14 @@ lint: dev
 
 docs: venv
 	$(BIN)/python docs/make.py
+
+# Of the meshes of the paper's authors, those that lie beside the checkout.
+PAPER_MESHES := $(wildcard $(addprefix $(WEATHERCOAT_MESHES)/,aki_Plane.obj aki_Curve2.obj aki_bunny2.obj))
+
+bench: .venv/bench-$(FINGERPRINT)
+	@mkdir -p build
+	$(BIN)/weathercoat bench speed $(PAPER_MESHES) -o build/bench --overwrite
+	$(BIN)/python docs/make.py speed --results build/bench
 
 clean:
 	rm -rf .venv $(DEMO) build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,12 +1,14 @@
 """Makes the generated pages and every picture of the documentation anew: all of them, or some by name.
 
     python docs/make.py                     all of it
-    python docs/make.py pages               configuration.md, errors.md, gallery.md and python.md
+    python docs/make.py pages               configuration.md, errors.md, gallery.md, performance.md, python.md
     python docs/make.py effects             the effect of each parameter, images/parameters
     python docs/make.py effects --key curl.radius
     python docs/make.py comparison          the default beside the paper's literal rules
     python docs/make.py gallery             every shipped config on five parts, images/gallery
     python docs/make.py first               the picture of the README
+    python docs/make.py speed --results FOLDER
+                                            performance.md with what `weathercoat bench speed -o FOLDER` wrote
 
 The pictures come from the tool as it is shipped and from generated parts, so anyone can make them again.
 """
@@ -14,8 +16,9 @@ The pictures come from the tool as it is shipped and from generated parts, so an
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from making import effects, gallery, pages
+from making import effects, gallery, pages, speed
 
 PARTS = ("pages", "effects", "comparison", "gallery", "first")
 
@@ -28,11 +31,14 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS) + "; all by default")
     parser.add_argument("--key", action="append", help="effects: only this parameter; may be given again")
     parser.add_argument("--config", action="append", help="gallery: only this config; may be given again")
+    parser.add_argument("--results", type=Path, metavar="FOLDER", help="speed: the results to take")
     wanted = parser.parse_args()
     parts = wanted.parts or PARTS
     for part in parts:
-        if part not in PARTS:
-            parser.error(f"no part {part!r}; there are {', '.join(PARTS)}")
+        if part not in (*PARTS, "speed"):
+            parser.error(f"no part {part!r}; there are {', '.join(PARTS)}, speed")
+    if ("speed" in parts) != (wanted.results is not None):
+        parser.error("speed takes --results FOLDER")
     if "pages" in parts:
         pages.write_pages()
     if "effects" in parts:
@@ -43,6 +49,8 @@ def main() -> None:
         gallery.draw_gallery(wanted.config)
     if "first" in parts:
         gallery.draw_first()
+    if "speed" in parts:
+        speed.take_results(wanted.results)
 
 
 if __name__ == "__main__":

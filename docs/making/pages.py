@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterator
 
 import weathercoat
-from making import effects, gallery
+from making import effects, gallery, speed
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
@@ -268,6 +268,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration_page,
     "errors.md": errors_page,
     "gallery.md": gallery_page,
+    "performance.md": speed.performance_page,
     "python.md": python_page,
 }
 

@@ -55,7 +55,7 @@ def step_table(results: dict[str, Any]) -> Table:
                 case["label"],
                 _digits(case["step_ms"]),
                 _digits(case["step_ms_at_end"]),
-                f"{speed[0]:,.0f} to {min(speed):,.0f}",
+                f"{_digits(speed[0])} to {_digits(min(speed))}",
                 _digits(sweep["ms"]),
                 _digits(sweep["floor_ms"]),
                 _digits(sweep["plain_ms"]),
