@@ -8,6 +8,7 @@ is known.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.connectivity import FREE, EditableMesh, collapse_edge, flip_edge, split_edge
@@ -30,10 +31,14 @@ def edge_length_of(h: int, mesh: EditableMesh) -> float:
 @kernel
 def edge_lengths(mesh: EditableMesh) -> Vectors:
     """Length of each edge at its representative half-edge, -1 at the others and at what is gone."""
+    p, tail, twin = mesh.position, mesh.tail, mesh.twin
     length = np.full(3 * mesh.count[1], -1.0)
     for h in range(len(length)):
-        if mesh.tail[h] >= 0 and mesh.twin[h] < h:
-            length[h] = edge_length_of(h, mesh)
+        if tail[h] >= 0 and twin[h] < h:
+            a, b = tail[h], tail[next_of(h)]
+            length[h] = np.sqrt(
+                (p[a, 0] - p[b, 0]) ** 2 + (p[a, 1] - p[b, 1]) ** 2 + (p[a, 2] - p[b, 2]) ** 2
+            )
     return length
 
 
@@ -117,32 +122,46 @@ def shape_of(p: Vectors, a: int, b: int, c: int) -> float:
 
 
 @kernel
+def _normal_and_shape(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, cx: float, cy: float, cz: float
+) -> tuple[float, float, float, float]:
+    """Normal, with twice the area as length, and `shape_of` the triangle of three points."""
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    vx, vy, vz = cx - ax, cy - ay, cz - az
+    wx, wy, wz = bx - cx, by - cy, bz - cz
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    total = (
+        (ux * ux + wx * wx + vx * vx) + (uy * uy + wy * wy + vy * vy) + (uz * uz + wz * wz + vz * vz)
+    )
+    shape = 2.0 * np.sqrt(3.0 * (x * x + y * y + z * z)) / total if total > 0 else 0.0
+    return x, y, z, shape
+
+
+@kernel
 def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: Vectors) -> bool:
     """Whether v may move to `target` (3,): turns over or flattens no face but those of vertex `avoid`."""
-    p, tail = mesh.position, mesh.tail
+    p, tail, twin, sources = mesh.position, mesh.tail, mesh.twin, mesh.source
     old_x, old_y, old_z = p[v, 0], p[v, 1], p[v, 2]
+    to_x, to_y, to_z = target[0], target[1], target[2]
     first = mesh.half_edge[v]
     h = first
     while True:
         b, c = tail[next_of(h)], tail[prev_of(h)]
         if b != avoid and c != avoid:
-            x, y, z = _corner_normal(p, v, b, c)
-            shape = shape_of(p, v, b, c)
-            p[v, 0], p[v, 1], p[v, 2] = target[0], target[1], target[2]
-            new_x, new_y, new_z = _corner_normal(p, v, b, c)
-            new_shape = shape_of(p, v, b, c)
-            p[v, 0], p[v, 1], p[v, 2] = old_x, old_y, old_z
+            bx, by, bz, cx, cy, cz = p[b, 0], p[b, 1], p[b, 2], p[c, 0], p[c, 1], p[c, 2]
+            x, y, z, shape = _normal_and_shape(old_x, old_y, old_z, bx, by, bz, cx, cy, cz)
+            new_x, new_y, new_z, new_shape = _normal_and_shape(to_x, to_y, to_z, bx, by, bz, cx, cy, cz)
             if new_shape < min(shape, _LEAST_SHAPE):
                 return False
             size = np.sqrt((x * x + y * y + z * z) * (new_x * new_x + new_y * new_y + new_z * new_z))
             if shape > _LEAST_SHAPE and x * new_x + y * new_y + z * new_z < _LEAST_COSINE * size:
                 return False
-            source = mesh.source[h // 3]
+            source = sources[h // 3]
             nx, ny, nz = normals[source, 0], normals[source, 1], normals[source, 2]
             facing = new_x * nx + new_y * ny + new_z * nz
             if facing < 0.0 and (shape <= _LEAST_SHAPE or x * nx + y * ny + z * nz > 0.0):
                 return False
-        h = mesh.twin[prev_of(h)]
+        h = twin[prev_of(h)]
         if h < 0 or h == first:
             return True
 
@@ -150,11 +169,12 @@ def may_move(v: int, avoid: int, target: Vectors, mesh: EditableMesh, normals: V
 @kernel
 def face_count_at(v: int, mesh: EditableMesh) -> tuple[int, bool]:
     """How many faces vertex v has, and whether they go all the way round."""
+    twin = mesh.twin
     first = mesh.half_edge[v]
     h, count = first, 0
     while True:
         count += 1
-        h = mesh.twin[prev_of(h)]
+        h = twin[prev_of(h)]
         if h < 0:
             return count, False
         if h == first:
@@ -164,12 +184,13 @@ def face_count_at(v: int, mesh: EditableMesh) -> tuple[int, bool]:
 @kernel
 def are_neighbours(u: int, v: int, mesh: EditableMesh) -> bool:
     """Whether an edge joins u and v."""
+    tail, twin = mesh.tail, mesh.twin
     first = mesh.half_edge[u]
     h = first
     while True:
-        if mesh.tail[next_of(h)] == v or mesh.tail[prev_of(h)] == v:
+        if tail[next_of(h)] == v or tail[prev_of(h)] == v:
             return True
-        h = mesh.twin[prev_of(h)]
+        h = twin[prev_of(h)]
         if h < 0 or h == first:
             return False
 
@@ -215,7 +236,7 @@ def keeps_topology(h: int, mesh: EditableMesh) -> bool:
 @kernel
 def _farthest_neighbour(v: int, avoid: int, target: Vectors, mesh: EditableMesh) -> float:
     """Largest squared distance of `target` from the neighbours of v but `avoid`."""
-    p, tail = mesh.position, mesh.tail
+    p, tail, twin = mesh.position, mesh.tail, mesh.twin
     first = mesh.half_edge[v]
     h, farthest = first, 0.0
     while True:
@@ -223,7 +244,7 @@ def _farthest_neighbour(v: int, avoid: int, target: Vectors, mesh: EditableMesh)
             if u != avoid:
                 d = (p[u, 0] - target[0]) ** 2 + (p[u, 1] - target[1]) ** 2 + (p[u, 2] - target[2]) ** 2
                 farthest = max(farthest, d)
-        h = mesh.twin[prev_of(h)]
+        h = twin[prev_of(h)]
         if h < 0 or h == first:
             return farthest
 
@@ -302,11 +323,11 @@ def _cotangent(p: Vectors, apex: int, a: int, b: int) -> float:
 @kernel
 def may_flip(h: int, mesh: EditableMesh, normals: Vectors) -> bool:
     """Whether flipping the inner edge of h keeps the mesh a manifold and turns no face over."""
+    p, tail = mesh.position, mesh.tail
     g = mesh.twin[h]
-    a, b, c, d = mesh.tail[h], mesh.tail[g], mesh.tail[prev_of(h)], mesh.tail[prev_of(g)]
+    a, b, c, d = tail[h], tail[g], tail[prev_of(h)], tail[prev_of(g)]
     if c == d or are_neighbours(c, d, mesh):
         return False
-    p = mesh.position
     ox, oy, oz = _corner_normal(p, a, b, c)
     ex, ey, ez = _corner_normal(p, b, a, d)
     old = np.sqrt(ox * ox + oy * oy + oz * oz) * np.sqrt(ex * ex + ey * ey + ez * ez)
@@ -354,31 +375,40 @@ def smallest_angles(mesh: EditableMesh) -> Vectors:
 @kernel
 def valence_excess(mesh: EditableMesh) -> Indices:
     """Edges at each vertex beyond the six of a regular one, four at a boundary; int32 (n,)."""
-    excess = np.zeros(len(mesh.half_edge), np.int32)
+    tail, twin, start = mesh.tail, mesh.twin, mesh.half_edge
+    excess = np.zeros(len(start), np.int32)
     for v in range(mesh.count[0]):
-        if mesh.half_edge[v] >= 0:
-            count, closed = face_count_at(v, mesh)
-            excess[v] = count - 6 if closed else count - 3
+        if start[v] >= 0:
+            excess[v] = -6 if twin[start[v]] >= 0 else -3
+    for h in range(3 * mesh.count[1]):
+        if tail[h] >= 0:
+            excess[tail[h]] += 1
     return excess
 
 
 @kernel
-def flip_pass(mesh: EditableMesh, normals: Vectors, excess: Indices, regularity: float) -> int:
+def flip_pass(
+    mesh: EditableMesh, normals: Vectors, excess: Indices, regularity: float, is_due: NDArray[np.bool_]
+) -> int:
     """Flip inner edges that are not Delaunay or whose flip makes valences regular; returns how many.
 
     An edge is flipped where cot α + cot β of the opposite angles is below `regularity` times half the
-    decrease of the sum of squares of `excess`, which is brought up to date.
+    decrease of the sum of squares of `excess`, which is brought up to date. Only edges whose half-edge is
+    marked in `is_due` (3 m,) are looked at; those about which a flip changed something are due again.
     """
-    p, tail = mesh.position, mesh.tail
+    p, tail, twin, crease, chain = mesh.position, mesh.tail, mesh.twin, mesh.crease, mesh.chain
     done = 0
     for h in range(3 * mesh.count[1]):
-        g = mesh.twin[h]
-        if tail[h] < 0 or g < h or mesh.crease[h] >= 0:
+        if not is_due[h]:
+            continue
+        is_due[h] = False
+        g = twin[h]
+        if tail[h] < 0 or g < h or crease[h] >= 0:
             continue
         a, b, c, d = tail[h], tail[g], tail[prev_of(h)], tail[prev_of(g)]
         gain = 0
         for v, change in ((a, -1), (b, -1), (c, 1), (d, 1)):
-            if mesh.chain[v] >= FREE:
+            if chain[v] >= FREE:
                 gain -= 2 * change * excess[v] + 1
         cotangents = _cotangent(p, c, a, b) + _cotangent(p, d, b, a)
         if cotangents < 0.5 * regularity * gain - 1e-9 and may_flip(h, mesh, normals):
@@ -387,13 +417,30 @@ def flip_pass(mesh: EditableMesh, normals: Vectors, excess: Indices, regularity:
             excess[b] -= 1
             excess[c] += 1
             excess[d] += 1
+            for v in (a, b, c, d):
+                _mark_edges_about(v, mesh, is_due)
             done += 1
     return done
+
+
+@kernel
+def _mark_edges_about(v: int, mesh: EditableMesh, is_due: NDArray[np.bool_]) -> None:
+    """Mark the edges of the faces of v, each at the smaller of its half-edges."""
+    twin = mesh.twin
+    first = mesh.half_edge[v]
+    h = first
+    while True:
+        for k in range(h - h % 3, h - h % 3 + 3):
+            is_due[k if twin[k] < 0 else min(k, twin[k])] = True
+        h = twin[prev_of(h)]
+        if h < 0 or h == first:
+            return
 
 
 def flip_edges(mesh: EditableMesh, normals: Vectors, passes: int, regularity: float = 0.0) -> None:
     """Flip until nothing changes, or for that many passes; see `flip_pass`."""
     excess = valence_excess(mesh)
+    is_due = np.ones(3 * int(mesh.count[1]), np.bool_)
     for _ in range(passes):
-        if flip_pass(mesh, normals, excess, regularity) == 0:
+        if flip_pass(mesh, normals, excess, regularity, is_due) == 0:
             return

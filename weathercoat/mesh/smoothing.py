@@ -67,17 +67,17 @@ def smooth(
 
     A mix of the mean of its neighbours and of springs of the length `edge_length`, with the weight `spring`.
     """
-    p, tail = mesh.position, mesh.tail
+    p, tail, twin, start, chains = mesh.position, mesh.tail, mesh.twin, mesh.half_edge, mesh.chain
     move = np.empty(3)
     for v in range(mesh.count[0]):
-        chain = mesh.chain[v]
+        chain = chains[v]
         if chain < FREE:
             continue
         if chain >= 0:
             before, after = arcs_beside(v, mesh, features)
             arc[v] = 0.5 * (before + after)
             continue
-        first = mesh.half_edge[v]
+        first = start[v]
         h = first
         move[:] = 0.0
         count = 0
@@ -90,7 +90,7 @@ def smooth(
             move[1] += pull * dy
             move[2] += pull * dz
             count += 1
-            h = mesh.twin[prev_of(h)]
+            h = twin[prev_of(h)]
             if h == first:
                 break
         lift = move[0] * normal[v, 0] + move[1] * normal[v, 1] + move[2] * normal[v, 2]
@@ -103,10 +103,10 @@ def apply_moves(
     mesh: EditableMesh, features: Features, normals: Vectors, goal: Vectors, arc: Vectors
 ) -> None:
     """Move each vertex to its goal, where that turns no face over and keeps the order along its chain."""
-    p = mesh.position
+    p, chains = mesh.position, mesh.chain
     target = np.empty(3)
     for v in range(mesh.count[0]):
-        chain = mesh.chain[v]
+        chain = chains[v]
         if chain < FREE:
             continue
         if chain >= 0:
