@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.buckets import order_rows
 from weathercoat.mesh.halfedge import first_half_edges, make_twins, next_of, prev_of
+from weathercoat.mesh.order import order_points
 from weathercoat.mesh.surface import Indices, Vectors
 
 FREE = -1
@@ -96,9 +98,23 @@ def compact(mesh: EditableMesh) -> EditableMesh:
     """The same mesh without what is gone and without room to spare; order is kept."""
     alive = np.flatnonzero(mesh.tail[0 : 3 * int(mesh.count[1]) : 3] >= 0)
     used = np.flatnonzero(mesh.half_edge[: int(mesh.count[0])] >= 0)
+    return _renumbered(mesh, used, alive)
+
+
+def order_along_curve(mesh: EditableMesh) -> EditableMesh:
+    """The same compact mesh with vertices and faces along the Morton curve, neighbours near each other."""
+    order = order_points(mesh.position)
+    rank = np.empty(len(order), np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    smallest = rank[mesh.tail].reshape(-1, 3).min(axis=1, keepdims=True)
+    return _renumbered(mesh, order, order_rows(smallest, len(order)))
+
+
+def _renumbered(mesh: EditableMesh, used: NDArray[np.integer], alive: NDArray[np.integer]) -> EditableMesh:
+    """The mesh of its vertices `used` and faces `alive`, in this order."""
     new_vertex = np.full(len(mesh.half_edge), -1, np.int32)
     new_vertex[used] = np.arange(len(used), dtype=np.int32)
-    half_edges = (3 * alive[:, None] + np.arange(3)).reshape(-1)
+    half_edges = (3 * alive[:, None].astype(np.int64) + np.arange(3)).reshape(-1)
     new_half_edge = np.full(len(mesh.tail) + 1, -1, np.int32)
     new_half_edge[half_edges] = np.arange(len(half_edges), dtype=np.int32)
     return EditableMesh(

@@ -130,9 +130,7 @@ def _normal_and_shape(
     vx, vy, vz = cx - ax, cy - ay, cz - az
     wx, wy, wz = bx - cx, by - cy, bz - cz
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    total = (
-        (ux * ux + wx * wx + vx * vx) + (uy * uy + wy * wy + vy * vy) + (uz * uz + wz * wz + vz * vz)
-    )
+    total = (ux * ux + wx * wx + vx * vx) + (uy * uy + wy * wy + vy * vy) + (uz * uz + wz * wz + vz * vz)
     shape = 2.0 * np.sqrt(3.0 * (x * x + y * y + z * z)) / total if total > 0 else 0.0
     return x, y, z, shape
 
@@ -437,10 +435,35 @@ def _mark_edges_about(v: int, mesh: EditableMesh, is_due: NDArray[np.bool_]) -> 
             return
 
 
-def flip_edges(mesh: EditableMesh, normals: Vectors, passes: int, regularity: float = 0.0) -> None:
-    """Flip until nothing changes, or for that many passes; see `flip_pass`."""
+@kernel
+def mark_edges_about_new(first: int, mesh: EditableMesh, is_due: NDArray[np.bool_]) -> None:
+    """Mark the edges whose flip the vertices from `first` on, which splits have added, may have changed."""
+    tail, twin, start = mesh.tail, mesh.twin, mesh.half_edge
+    for v in range(first, mesh.count[0]):
+        _mark_edges_about(v, mesh, is_due)
+        h = start[v]
+        while True:
+            _mark_edges_about(tail[next_of(h)], mesh, is_due)
+            q = prev_of(h)
+            h = twin[q]
+            if h < 0:
+                _mark_edges_about(tail[q], mesh, is_due)
+            if h < 0 or h == start[v]:
+                break
+
+
+def flip_edges(
+    mesh: EditableMesh,
+    normals: Vectors,
+    passes: int,
+    regularity: float = 0.0,
+    is_due: NDArray[np.bool_] | None = None,
+) -> None:
+    """Flip until nothing changes, or for that many passes, as `flip_pass` does; all edges are due if none are
+    named."""
     excess = valence_excess(mesh)
-    is_due = np.ones(3 * int(mesh.count[1]), np.bool_)
+    if is_due is None:
+        is_due = np.ones(3 * int(mesh.count[1]), np.bool_)
     for _ in range(passes):
         if flip_pass(mesh, normals, excess, regularity, is_due) == 0:
             return

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.mesh.closest import find_closest, make_closest_tree
 from weathercoat.mesh.connectivity import FREE, EditableMesh, flip_edge
 from weathercoat.mesh.edits import may_flip, may_move, shape_of
 from weathercoat.mesh.halfedge import next_of, prev_of
@@ -44,15 +45,11 @@ def sample_bends(source: InputSurface, edge_length: float) -> tuple[Vectors, Ind
     )
 
 
-def distances_to(mesh: EditableMesh, points: Vectors) -> tuple[Vectors, Indices]:
-    """Distance (k,) of points (k, 3) from a compact mesh, and its nearest face (k,)."""
-    import igl
-
-    tree = igl.AABB()
-    faces = mesh.tail.reshape(-1, 3).astype(np.int64)
-    tree.init(mesh.position, faces)
-    squared, face, _ = tree.squared_distance(mesh.position, faces, points)
-    return np.sqrt(squared), face.astype(np.int32)
+def distances_to(mesh: EditableMesh, points: Vectors, hint: Indices) -> tuple[Vectors, Indices]:
+    """Distance (k,) of points (k, 3) from a compact mesh, and its nearest face (k,), perhaps `hint` (k,)."""
+    tree = make_closest_tree(mesh.position, mesh.tail.reshape(-1, 3))
+    face, near = find_closest(tree, points, hint)
+    return np.linalg.norm(near - points, axis=1), face
 
 
 @kernel
@@ -120,11 +117,11 @@ def flip_nearer(mesh: EditableMesh, source: InputSurface, tolerance: float) -> i
     g = mesh.twin[h]
     p, tail = mesh.position, mesh.tail
     middle = 0.5 * (p[tail[h]] + p[tail[g]])
-    before = np.linalg.norm(source.closest(middle)[1] - middle, axis=1)
+    before = np.linalg.norm(source.closest(middle, mesh.source[h // 3])[1] - middle, axis=1)
     far = before > tolerance
     h, g, before = h[far], g[far], before[far]
     middle = 0.5 * (p[tail[h - h % 3 + (h + 2) % 3]] + p[tail[g - g % 3 + (g + 2) % 3]])
-    after = np.linalg.norm(source.closest(middle)[1] - middle, axis=1) if len(h) else before
+    after = np.linalg.norm(source.closest(middle, mesh.source[h // 3])[1] - middle, axis=1)
     better = np.flatnonzero(after < _CLEARLY_NEARER * before)
     order = better[np.argsort(after[better] - before[better], kind="stable")]
     return int(_flip_apart(h[order], mesh, source.normals))

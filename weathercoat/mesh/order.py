@@ -45,7 +45,7 @@ def order_surface(surface: Surface, points: Vectors) -> tuple[Surface, Indices]:
 
     Faces begin with their smallest vertex. Also returned: for each new face the old one, int32 (m,).
     """
-    order = _order_points(points)
+    order = order_points(points)
     rank = np.empty(len(order), np.int32)
     rank[order] = np.arange(len(order), dtype=np.int32)
     faces, turn = rank[surface.faces], np.empty(len(surface.faces), np.int8)
@@ -79,7 +79,7 @@ def _begin_with_smallest(faces: Indices, turn: NDArray[np.int8]) -> None:
             faces[f, 0], faces[f, 1], faces[f, 2] = c, a, b
 
 
-def _order_points(points: Vectors) -> Indices:
+def order_points(points: Vectors) -> Indices:
     """Points (n, 3) along the curve, those of one code by their coordinates, and then as they come; (n,)."""
     code = morton_codes(points)
     order = order_codes(code)

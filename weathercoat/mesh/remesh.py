@@ -27,6 +27,7 @@ from weathercoat.mesh.connectivity import (
     drop_faces,
     join_meshes,
     make_editable_mesh,
+    order_along_curve,
     reserve,
 )
 from weathercoat.mesh.creases import Features, find_features, release_chains
@@ -35,6 +36,7 @@ from weathercoat.mesh.edits import (
     edge_lengths,
     face_shapes,
     flip_edges,
+    mark_edges_about_new,
     smallest_angles,
     split_pass,
 )
@@ -198,6 +200,7 @@ def _iterate(
 ) -> EditableMesh:
     random = _stream(parameters.seed, "remesh")
     mesh = _shuffle(mesh, features, source, edge_length, random)
+    mesh = order_along_curve(compact(mesh))
     length = edge_length
     parts = find_flat_parts(
         source.normals, face_areas(source.vertices, source.faces), source.twin, edge_length
@@ -207,6 +210,7 @@ def _iterate(
         mesh = _collapse(mesh, features, source, length, random)
         mesh = _remove_poor_faces(mesh, features, source, length)
         mesh = _mend(mesh, features, source, edge_length, 2)
+        mesh = order_along_curve(mesh)  # splits append vertices far from their neighbours
         length *= float(np.clip(np.sqrt(mesh.count[1] / parameters.faces), 0.9, 1.1))
         flip_edges(mesh, source.normals, 10, _REGULARITY)
         for _ in range(2):
@@ -252,12 +256,15 @@ def _shuffle(
     random: np.random.Generator,
 ) -> EditableMesh:
     """Split at random until no edge is long, inner edges further: nothing is left of the input's pattern."""
+    is_due = np.ones(3 * int(mesh.count[1]), np.bool_)
     for _ in range(_MOST_SHUFFLES):
-        before = int(mesh.count[1])
+        before = int(mesh.count[0])
         mesh = _split(mesh, features, _SHUFFLE * edge_length, _SPLIT * edge_length, random)
-        if int(mesh.count[1]) == before:
+        if int(mesh.count[0]) == before:
             break
-        flip_edges(mesh, source.normals, 3)
+        is_due = np.concatenate([is_due, np.zeros(3 * int(mesh.count[1]) - len(is_due), np.bool_)])
+        mark_edges_about_new(before, mesh, is_due)
+        flip_edges(mesh, source.normals, 3, 0.0, is_due)
     return mesh
 
 
@@ -339,9 +346,10 @@ def _fit(mesh: EditableMesh, features: Features, source: InputSurface, edge_leng
         return  # so coarse a mesh misses most bends, and following them would only make it uneven
     tolerance = _FIT_TOLERANCE * diagonal
     points, below = sample_bends(source, edge_length)
+    near = np.zeros(len(points), np.int32)
     held = np.zeros(len(mesh.half_edge), np.bool_)
     for number in range(_FIT_ROUNDS):
-        distance, near = distances_to(mesh, points)
+        distance, near = distances_to(mesh, points, near)
         if number == 0:
             watched = distance > 0.5 * tolerance
             points, distance = points[watched], distance[watched]
@@ -412,5 +420,5 @@ def _find_places(mesh: EditableMesh, features: Features, source: InputSurface) -
     hint = mesh.source[mesh.half_edge // 3]
     face, point = source.project(mesh.position, normal, hint)
     held = mesh.chain != FREE
-    face[held], point[held] = source.closest(mesh.position[held])
+    face[held], point[held] = source.closest(mesh.position[held], hint[held])
     return face, barycentric_of(point, source.vertices[source.faces[face]])

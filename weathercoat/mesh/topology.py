@@ -84,6 +84,14 @@ def orient(vertices: Points, faces: Faces, twin: Indices) -> Orientation:
     )
 
 
+def number_components(faces: Faces, twin: Indices) -> Indices:
+    """The component of each face, from 0 in the order of their first faces, (m,)."""
+    component = np.full(len(faces), -1, np.int32)
+    turned, queue = np.zeros(len(faces), np.bool_), np.empty(len(faces), np.int32)
+    _spread_orientation(faces, twin, component, turned, queue)
+    return component
+
+
 def split_vertices(vertex_count: int, faces: Faces, twin: Ints) -> tuple[Faces, NDArray[np.int64]]:
     """Faces in which every vertex has one fan: corners that no common edge joins get vertices of their own.
 
