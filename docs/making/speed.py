@@ -14,6 +14,7 @@ from weathercoat.bench.tables import (
     peer_table,
     stage_table,
     step_table,
+    variant_table,
 )
 
 PAGE = DOCS / "performance.md"
@@ -44,6 +45,7 @@ def _results() -> str:
         f"Seconds for 1,000 steps, beside the paper's ({paper})": stage_table,
         "Milliseconds per step, over the run and at its end, and per sweep at its end": step_table,
         "Milliseconds per sweep, and per iteration of pypbd over as many constraints": peer_table,
+        "Variants: times faster than the base, and distance from where it ends, in mean edges": variant_table,
         "What the runs came to, and how much of them was timed": load_table,
     }
     parts = [f"{machine}; {versions}.", " ".join(abilities)]

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from weathercoat.bench.cases import STAGES
+from weathercoat.bench.cases import STAGES, Case
 from weathercoat.bench.speed import bench_speed
-from weathercoat.bench.tables import as_csv, as_markdown, as_text, stage_table
+from weathercoat.bench.tables import as_csv, as_markdown, as_text, stage_table, variant_table
 from weathercoat.cli.handler import call
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.output.meshes import write_mesh
@@ -71,6 +71,22 @@ def test_tables_show_them(results: dict[str, Any]) -> None:
 
 def machine_is_named(lines: list[str], results: dict[str, Any]) -> bool:
     return lines[0].startswith(results["machine"]["cpu"])
+
+
+def test_a_variant_is_measured_against_its_base(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer sweeps are faster and end elsewhere."""
+    base = Case("plate 400", 400, 20)
+    variant = Case("fewer", 400, 20, overrides=("deformation.sweeps=2",), variant_of=base.label)
+    monkeypatch.setattr("weathercoat.bench.speed.make_cases", lambda *asked: [base, variant])
+    found = bench_speed([], [400], steps=20, repeats=1)
+    assert [case["variant_of"] for case in found["cases"]] == ["", "plate 400"]
+    assert found["cases"][0]["apart"] is None and 0.0 < found["cases"][1]["apart"]["rms"] < 1.0
+    assert found["growth"]["faces"] == [400]
+    heading, row = variant_table(found)
+    assert len(row) == len(heading) and row[0] == "fewer"
+    assert float(row[3]) == pytest.approx(
+        found["cases"][0]["step_ms"] / found["cases"][1]["step_ms"], abs=0.01
+    )
 
 
 def test_the_papers_figures_stand_below_ours(results: dict[str, Any]) -> None:
@@ -139,5 +155,5 @@ def test_a_case_that_dies_is_named(tmp_path: Path) -> None:
     from weathercoat.errors import CheckError
 
     with pytest.raises(CheckError, match="no result") as caught:
-        measure_apart(Case("gone", 500, 20), tmp_path / "none.npz", 1)
+        measure_apart(Case("gone", 500, 20), tmp_path / "none.npz", tmp_path / "end.npz", 1)
     assert caught.value.file == "gone"

@@ -30,13 +30,15 @@ def measure_machine_apart() -> dict[str, Any]:
 
 
 def measure_apart(
-    case: Case, mesh: Path, repeats: int, progress: Callable[[int], None] = lambda steps: None
+    case: Case, mesh: Path, end: Path, repeats: int, progress: Callable[[int], None] = lambda steps: None
 ) -> dict[str, Any]:
     """The figures of `measure.measure_case` on the mesh in an .npz file with `vertices` and `faces`.
 
+    end: the .npz file that gets the film at the end.
+
     Raises CheckError where the case cannot be measured.
     """
-    job = {"job": "case", "case": asdict(case), "mesh": str(mesh), "repeats": repeats}
+    job = {"job": "case", "case": asdict(case), "mesh": str(mesh), "end": str(end), "repeats": repeats}
     return _ask(job, case.label, progress)
 
 
@@ -85,7 +87,9 @@ def _do(job: dict[str, Any]) -> dict[str, Any]:
     case = Case(**{**job["case"], "overrides": tuple(job["case"]["overrides"])})
     with np.load(job["mesh"]) as arrays:
         surface = make_surface(arrays["vertices"], arrays["faces"])
-    return {"result": measure_case(case, surface, repeats=job["repeats"], progress=_say_progress)}
+    end = Path(job["end"])
+    figures = measure_case(case, surface, repeats=job["repeats"], progress=_say_progress, end=end)
+    return {"result": figures}
 
 
 def _machine() -> dict[str, Any]:

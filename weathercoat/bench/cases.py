@@ -45,7 +45,8 @@ class Case:
 
     sample: the number of steps that are timed in each tenth of the run, 0 for all. with_peer: whether the
     peer is timed on the state at the end. overrides: `key=value` of the config in which it differs from the
-    benchmark's. A variant is a line in `make_cases`.
+    benchmark's. variant_of: the label of the case whose mesh it has and with whose end its own is compared,
+    empty for none.
     """
 
     label: str
@@ -54,6 +55,7 @@ class Case:
     sample: int = 0
     with_peer: bool = False
     overrides: tuple[str, ...] = ()
+    variant_of: str = ""
 
 
 def make_cases(meshes: Sequence[tuple[str, int]], plates: Sequence[int], steps: int) -> list[Case]:

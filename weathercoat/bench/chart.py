@@ -21,7 +21,8 @@ def draw_chart(results: dict[str, Any], stream: BinaryIO) -> None:
 
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     growth, speed = figure.subplots(1, 2)
-    plates = [case for case in results["cases"] if case["label"].startswith("plate ")] or results["cases"]
+    cases = [case for case in results["cases"] if not case["variant_of"]]
+    plates = [case for case in cases if case["label"].startswith("plate ")] or cases
     faces = [case["faces"] for case in plates]
     for name in (*(stage for stage in STAGES if stage != "other"), "total"):
         seconds = [case["seconds"][name] for case in plates]
@@ -37,7 +38,7 @@ def draw_chart(results: dict[str, Any], stream: BinaryIO) -> None:
     )
     growth.set(xscale="log", yscale="log", xlabel="faces", ylabel="seconds for 1,000 steps")
     growth.legend(fontsize=8)
-    for case in results["cases"]:
+    for case in cases:
         tenths = len(case["steps_per_second"])
         ages = [(i + 0.5) / tenths for i in range(tenths)]
         speed.plot(ages, case["steps_per_second"], "o-", label=case["label"], markersize=3)

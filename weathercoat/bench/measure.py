@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from statistics import median
 from typing import Any
 
 from weathercoat.bench import roofline
 from weathercoat.bench.cases import STAGES, Case
+from weathercoat.bench.compare import save_end
 from weathercoat.bench.drive import Tenth, drive, sum_stages
 from weathercoat.bench.machine import forget_peak, peak_bytes, resident_bytes
 from weathercoat.bench.peer import PeerSheet, peer_version
@@ -41,11 +43,17 @@ def warm_up() -> float:
 
 
 def measure_case(
-    case: Case, surface: Surface, *, repeats: int, progress: Callable[[int], None] = lambda steps: None
+    case: Case,
+    surface: Surface,
+    *,
+    repeats: int,
+    progress: Callable[[int], None] = lambda steps: None,
+    end: Path | None = None,
 ) -> dict[str, Any]:
     """The figures of a case as plain values: medians over `repeats` runs, all times for 1,000 steps.
 
-    progress: called with the steps done of `repeats` runs.
+    progress: called with the steps done of `repeats` runs. end: the .npz file that gets the film at the end,
+    for `compare_ends`.
     """
     config = load_speed_config(case.steps, case.overrides)
     forget_peak()
@@ -61,6 +69,8 @@ def measure_case(
         if number < repeats - 1:
             del simulation  # before the next one takes its room
     peak = peak_bytes()
+    if end is not None:
+        save_end(simulation, end)
     load = measure_load(simulation, sum(tenth.broken_edges for tenth in runs[-1]))
     sums = [sum_stages(run, SCALED_STEPS) for run in runs]
     seconds = {name: median(times[name] for times in sums) for name in (*STAGES, "total", "cpu")}
@@ -72,6 +82,7 @@ def measure_case(
         "steps": case.steps,
         "timed_steps": sum(tenth.timed for tenth in runs[-1]),
         "overrides": list(case.overrides),
+        "variant_of": case.variant_of,
         "repeats": repeats,
         "seconds": {name: seconds[name] for name in (*STAGES, "total")},
         "cpu_seconds": seconds["cpu"],

@@ -12,6 +12,7 @@ import numpy as np
 
 from weathercoat.bench.apart import measure_apart, measure_machine_apart
 from weathercoat.bench.cases import PAPER_MACHINE, STAGES, find_paper_timing, make_cases
+from weathercoat.bench.compare import compare_ends
 from weathercoat.bench.growth import fit_exponent
 from weathercoat.bench.peer import peer_version
 from weathercoat.bench.roofline import floor_ms
@@ -23,6 +24,7 @@ from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.mesh.surface import Surface
 
 FEWEST_FACES, FEWEST_STEPS = 100, 10
+_LEAST_CPU_SHARE = 0.9  # of the wall time; with less, figures say more about other processes
 _GROWTH_FROM = 10_000  # faces: below, what does not depend on them counts too much
 
 
@@ -51,17 +53,27 @@ def bench_speed(
     machine = measure_machine_apart()
     found: list[dict[str, Any]] = []
     total = len(cases) * repeats * steps
+    meshes_of: dict[str, Path] = {}
+    ends_of: dict[str, Path] = {}
     with TemporaryDirectory() as folder:
         for number, case in enumerate(cases):
-            done = number * repeats * steps
-            mesh = Path(folder) / f"{number}.npz"
             say(f"{case.label}: {case.faces:,} faces")
-            _save(ready.get(case.label) or make_random_sheet(case.faces), mesh)
-            figures = measure_apart(case, mesh, repeats, partial(_report, progress, done, total))
-            mesh.unlink()
+            mesh = meshes_of.get(case.variant_of) or Path(folder) / f"mesh_{number}.npz"
+            end = Path(folder) / f"end_{number}.npz"
+            if not case.variant_of:
+                _save(ready.get(case.label) or make_random_sheet(case.faces), mesh)
+            tell = partial(_report, progress, number * repeats * steps, total)
+            figures = measure_apart(case, mesh, end, repeats, tell)
             for deviation in figures["deviations"]:
                 say(f"{case.label}: not the benchmark's situation: {deviation}")
-            found.append(_completed(figures, machine))
+            share = figures["cpu_seconds"] / figures["seconds"]["total"]
+            if share < _LEAST_CPU_SHARE:
+                say(
+                    f"{case.label}: the machine was busy: only {share:.0%} of the time was this process's own"
+                )
+            apart = compare_ends(end, ends_of[case.variant_of]) if case.variant_of else None
+            found.append({**_completed(figures, machine), "apart": apart})
+            meshes_of[case.label], ends_of[case.label] = mesh, end
     return {
         "schema": 1,
         "machine": machine,
@@ -128,7 +140,7 @@ def _completed(figures: dict[str, Any], machine: dict[str, Any]) -> dict[str, An
 
 def _growth(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The exponent of each stage over the plates, from 10,000 faces on where there are several."""
-    plates = [case for case in cases if case["label"].startswith("plate ") and not case["overrides"]]
+    plates = [case for case in cases if case["label"].startswith("plate ") and not case["variant_of"]]
     large = [case for case in plates if case["faces"] >= _GROWTH_FROM]
     fitted = large if len(large) >= 2 else plates
     faces = [case["faces"] for case in fitted]

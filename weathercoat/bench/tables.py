@@ -81,6 +81,20 @@ def peer_table(results: dict[str, Any]) -> Table:
     return table
 
 
+def variant_table(results: dict[str, Any]) -> Table:
+    """Each variant beside what it varies: how much faster, and how far apart they end, in mean edges."""
+    table = [["", "ms/step", "at 60 %", "times faster", "at 60 %", "RMS", "99 %", "largest"]]
+    by_label = {case["label"]: case for case in results["cases"]}
+    for case in results["cases"]:
+        if case["variant_of"]:
+            base, gap = by_label[case["variant_of"]], case["apart"]
+            faster = [f"{base[name] / case[name]:.2f}" for name in ("step_ms", "step_ms_at_end")]
+            gaps = [_digits(gap[name]) if gap[name] else "0" for name in ("rms", "percentile_99", "largest")]
+            times = [_digits(case[name]) for name in ("step_ms", "step_ms_at_end")]
+            table.append([case["label"], *times, *faster, *gaps])
+    return table
+
+
 def load_table(results: dict[str, Any]) -> Table:
     """What each run came to, and how much of it was timed."""
     table = [["", "steps timed", "separated", "breaks per 10,000 faces", "fallen"]]
@@ -121,6 +135,7 @@ def as_text(results: dict[str, Any]) -> Iterator[str]:
         "Seconds for 1,000 steps": stage_table,
         "Steps, and one sweep at the end": step_table,
         "One sweep beside the peer's, ms": peer_table,
+        "Variants: speed, and how far from the base they end, in mean edges": variant_table,
         "The situation at the end": load_table,
     }
     for title, make in titles.items():
