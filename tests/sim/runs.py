@@ -140,9 +140,9 @@ def assert_invariants(simulation: Simulation, *, thorough: bool = True) -> None:
 
     assert np.isfinite(mesh.positions[used]).all()
     assert np.abs(offset).max(initial=0.0) < 10.0, "film has flown off"
-    for values in (film.tension_now, film.tension_cap, film.cohesion, film.adhesion, simulation.rust.film):
+    for values in (film.tension, film.tension_cap, film.cohesion, film.adhesion, simulation.rust.film):
         assert np.isfinite(values).all()
-    assert (film.tension_now >= 0.0).all()
+    assert (film.tension >= 0.0).all()
     assert (simulation.rust.film >= 0.0).all() and (simulation.rust.film <= 1.0).all()
     tips = np.flatnonzero(film.is_tip[: mesh.vertex_count])
     np.testing.assert_allclose(np.linalg.norm(film.crack_direction[tips], axis=1), 1.0, rtol=1e-12)

@@ -9,16 +9,25 @@ import math
 import numpy as np
 
 from weathercoat.compile import kernel
-from weathercoat.film.relaxation import rest_direction, set_tension, tension_across, unload_round_crack
+from weathercoat.film.agenda import STEP, Agenda, call_edge, join_fringe
+from weathercoat.film.calendar import HORIZON, put, take_due
+from weathercoat.film.fringe import disturb_round
+from weathercoat.film.relaxation import (
+    relax_face,
+    rest_direction,
+    tension_across,
+    tension_until,
+    unload_round_crack,
+)
 from weathercoat.film.state import (
     FilmParameters,
     FilmRules,
     FilmState,
+    face_tension,
     inherit_film,
     make_film_rules,
 )
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, prev_of
-from weathercoat.mesh.surface import Indices, Vectors
 
 _EQUAL = 1e-9  # overloads that differ by less are equal: on a grid last bits would decide
 
@@ -26,57 +35,71 @@ _EQUAL = 1e-9  # overloads that differ by less are equal: on a grid last bits wo
 def fracture(
     mesh: HalfEdgeMesh,
     state: FilmState,
+    agenda: Agenda,
     parameters: FilmParameters,
     age: float,
-    duration: float,
+    tick: float,
     log: EventLog,
 ) -> None:
-    """Break what is overloaded at an age, in as many rounds as cracks run edges in `duration`; appends to the
+    """Break what is overloaded at an age, in as many rounds as cracks run edges in a tick; appends to the
     log.
 
     The most overloaded edges break first; each is tested again before it breaks, since every break relaxes
     what is round it. What a break makes critical comes in the next round, so that neither the mesh nor the
-    number of steps sets the speed of a crack. Tensions must have been evaluated at this age.
+    number of steps sets the speed of a crack. Comes after `separate` in a step.
     """
-    rules = make_film_rules(parameters)
-    rounds = 1
-    if parameters.fracture_rounds == "by_speed":
-        state.crack_budget[0] += parameters.fracture_speed * duration / state.mean_edge
-        rounds = int(state.crack_budget[0])
-        state.crack_budget[0] -= rounds
-    overload = np.empty(len(mesh.twin))
-    candidates = np.empty(len(mesh.twin), np.int32)
-    stack = np.empty(len(mesh.twin), np.int32)
-    first_break = int(log.counts[1])
-    for number in range(rounds):
-        if number == 0:
-            found = find_overloaded(mesh, state, rules, age, candidates, overload)
-        else:
-            found = find_overloaded_at_tips(mesh, state, rules, age, log, first_break, candidates, overload)
-        if found == 0:
-            return
-        order = np.lexsort((state.tie[candidates[:found]], -np.round(overload[:found] / _EQUAL)))
-        first_break = int(log.counts[1])
-        break_in_order(mesh, state, rules, age, candidates[:found][order], log, stack)
+    _fracture(mesh, state, make_film_rules(parameters), agenda, age, tick, log)
 
 
 @kernel
-def edge_overload(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int, age: float) -> float:
-    """Tension of the two faces of an inner edge over its cohesion now, the direction factor included.
+def _fracture(
+    mesh: HalfEdgeMesh,
+    state: FilmState,
+    rules: FilmRules,
+    agenda: Agenda,
+    age: float,
+    tick: float,
+    log: EventLog,
+) -> None:
+    rounds = 1
+    if rules.crack_speed < math.inf:
+        state.crack_budget[0] += rules.crack_speed * tick / state.mean_edge
+        rounds = int(state.crack_budget[0])
+        state.crack_budget[0] -= rounds
+    first_break = log.counts[1]
+    for number in range(rounds):
+        if number == 0:
+            found = find_overloaded(mesh, state, rules, agenda, age, tick)
+        else:
+            found = find_overloaded_at_tips(mesh, state, rules, agenda, age, log, first_break)
+        if found == 0:
+            return
+        sort_by_overload(state, agenda, found)
+        first_break = log.counts[1]
+        break_in_order(mesh, state, rules, agenda, age, found, log)
+
+
+@kernel
+def edge_overload(
+    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int, age: float, later: float
+) -> float:
+    """Tension of the two faces of an inner edge over its cohesion at an age, the direction factor included.
 
     Where an end is a tip and the way from it to the other end goes on in the tip's direction (dot product at
     least alpha, on the rest surface), the cohesion counts beta times, once, and of the tensions counts what
-    pulls across the edge.
+    pulls across the edge. With a `later` age that is later: no less than the overload is at any time between,
+    as far as no event comes in.
     """
     g = mesh.twin[h]
     a, b = mesh.tail[h], mesh.tail[g]
-    bond = min(cohesion_at(state, rules, h, age), cohesion_at(state, rules, g, age))
+    bond = min(cohesion_at(state, rules, h, later), cohesion_at(state, rules, g, later))
     if leads_on(mesh, state, rules, a, b) or leads_on(mesh, state, rules, b, a):
         bond *= rules.direction_factor
-        load = tension_across(mesh, state, rules, h // 3, a, b, age)
-        load += tension_across(mesh, state, rules, g // 3, a, b, age)
+        load = tension_across(mesh, state, rules, h // 3, a, b, age, later)
+        load += tension_across(mesh, state, rules, g // 3, a, b, age, later)
     else:
-        load = state.tension_now[h // 3] + state.tension_now[g // 3]
+        load = tension_until(state, rules, h // 3, age, later)
+        load += tension_until(state, rules, g // 3, age, later)
     return load / bond if bond > 0.0 else math.inf
 
 
@@ -107,34 +130,40 @@ def leads_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, tip: int, o
 
 @kernel
 def find_overloaded(
-    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, age: float, candidates: Indices, overload: Vectors
+    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, agenda: Agenda, age: float, tick: float
 ) -> int:
-    """Collect the edges that break at an age, by their smaller half-edge, with their overload; returns how
-    many.
+    """Collect in agenda.found the edges that break at an age, by their smaller half-edge ascending, with
+    their overload in agenda.values; returns how many.
     """
-    tail, twin, separated, is_tip = mesh.tail, mesh.twin, state.separated, state.is_tip
-    tension, cohesion, fray_age = state.tension_now, state.cohesion, state.fray_age
-    most_frayed = math.exp(-rules.cohesion_decay_rate * age)
+    edges, step = agenda.found, agenda.counts[STEP]
+    due = edges[: take_due(agenda.edges, step, edges)]
+    due.sort()
     found = 0
-    for h in range(len(twin)):
-        g = twin[h]
-        if g < h:
+    for h in due:
+        g = mesh.twin[h]
+        if g < 0 or not (state.separated[mesh.tail[h]] and state.separated[mesh.tail[g]]):
             continue
-        a, b = tail[h], tail[g]
-        if not (separated[a] and separated[b]):
-            continue
-        # what the edge cannot fall below is cheap to know, and settles most edges
-        least = min(cohesion[h], cohesion[g])
-        if fray_age[h // 3] < age or fray_age[g // 3] < age:
-            least *= most_frayed
-        if tension[h // 3] + tension[g // 3] <= least and not (is_tip[a] or is_tip[b]):
-            continue
-        load = edge_overload(mesh, state, rules, h, age)
-        if load > 1.0:
-            candidates[found] = h
-            overload[found] = load
+        overload = edge_overload(mesh, state, rules, h, age, age)
+        ahead = 1
+        if overload > 1.0 and not is_slack(mesh, state, rules, h, age):
+            edges[found] = h
+            agenda.values[found] = overload
             found += 1
+        elif overload <= 1.0:
+            ahead = HORIZON
+            while ahead > 1 and edge_overload(mesh, state, rules, h, age, age + ahead * tick) > 1.0:
+                ahead //= 2
+        put(agenda.edges, h, step + ahead)
     return found
+
+
+@kernel
+def is_slack(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int, age: float) -> bool:
+    """Whether nothing pulls on an inner edge away from tips: it holds then even without any cohesion."""
+    g = mesh.twin[h]
+    if state.is_tip[mesh.tail[h]] or state.is_tip[mesh.tail[g]]:
+        return False
+    return face_tension(state, rules, h // 3, age) + face_tension(state, rules, g // 3, age) <= 0.0
 
 
 @kernel
@@ -142,11 +171,10 @@ def find_overloaded_at_tips(
     mesh: HalfEdgeMesh,
     state: FilmState,
     rules: FilmRules,
+    agenda: Agenda,
     age: float,
     log: EventLog,
     first_break: int,
-    candidates: Indices,
-    overload: Vectors,
 ) -> int:
     """As `find_overloaded`, of the edges at the tips that the log's breaks from `first_break` on have made.
 
@@ -163,13 +191,26 @@ def find_overloaded_at_tips(
             while leaving >= 0:
                 g = mesh.twin[leaving]
                 if g >= 0 and state.separated[mesh.tail[g]]:
-                    load = edge_overload(mesh, state, rules, leaving, age)
-                    if load > 1.0:
-                        candidates[found] = min(leaving, g)
-                        overload[found] = load
+                    overload = edge_overload(mesh, state, rules, leaving, age, age)
+                    if overload > 1.0:
+                        agenda.found[found] = min(leaving, g)
+                        agenda.values[found] = overload
                         found += 1
                 leaving = mesh.twin[prev_of(leaving)]
     return found
+
+
+@kernel
+def sort_by_overload(state: FilmState, agenda: Agenda, count: int) -> None:
+    """Bring the first `count` edges in agenda.found into the order in which they break: by overload, the
+    largest first, and equals by their hash.
+    """
+    edges = agenda.found[:count]
+    if count == 1:
+        return
+    rank = -np.rint(agenda.values[:count] / _EQUAL)
+    by_tie = np.argsort(state.tie[edges], kind="mergesort")
+    edges[:] = edges[by_tie][np.argsort(rank[by_tie], kind="mergesort")]
 
 
 @kernel
@@ -177,20 +218,26 @@ def break_in_order(
     mesh: HalfEdgeMesh,
     state: FilmState,
     rules: FilmRules,
+    agenda: Agenda,
     age: float,
-    half_edges: Indices,
+    count: int,
     log: EventLog,
-    stack: Indices,
 ) -> None:
-    """Break the edges one after another, each where it is still overloaded."""
-    for h in half_edges:
-        if mesh.twin[h] >= 0 and edge_overload(mesh, state, rules, h, age) > 1.0:
-            break_edge(mesh, state, rules, age, h, log, stack)
+    """Break the first `count` edges in agenda.found one after another, each where it is still overloaded."""
+    for h in agenda.found[:count]:
+        if mesh.twin[h] >= 0 and edge_overload(mesh, state, rules, h, age, age) > 1.0:
+            break_edge(mesh, state, rules, agenda, age, h, log)
 
 
 @kernel
 def break_edge(
-    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, age: float, h: int, log: EventLog, stack: Indices
+    mesh: HalfEdgeMesh,
+    state: FilmState,
+    rules: FilmRules,
+    agenda: Agenda,
+    age: float,
+    h: int,
+    log: EventLog,
 ) -> None:
     """Break the edge of half-edge h: part its faces, make tips or copies at its ends, relax the film round
     it.
@@ -202,15 +249,55 @@ def break_edge(
     tip_start, tip_end = cut_edge(mesh, log, h)
     inherit_film(state, log, first_split)
     if tip_start:
-        state.is_tip[start] = True
-        rest_direction(mesh, origins[1], origins[0], state.crack_direction[start])
+        make_tip(mesh, state, agenda, start, origins[1])
     if tip_end:
-        state.is_tip[end] = True
-        rest_direction(mesh, origins[0], origins[1], state.crack_direction[end])
-    for side in range(2):
-        f = h // 3 if side == 0 else g // 3
-        state.fray_age[f] = min(state.fray_age[f], age)
+        make_tip(mesh, state, agenda, end, origins[0])
+    call_hinges(mesh, state, agenda, h, g, log, first_split)
+    for turn in range(2):
+        side = h if turn == 0 else g
+        fray(mesh, state, agenda, side // 3, age)
         if rules.shear_lag > 0.0:
-            unload_round_crack(mesh, state, rules, age, f, origins[0], origins[1], tip_start, tip_end, stack)
+            unload_round_crack(
+                mesh, state, rules, agenda, age, side, origins[0], origins[1], tip_start, tip_end
+            )
         else:
-            set_tension(state, f, rules.face_factor * state.tension_now[f], state.tension_cap[f], age)
+            relax_face(state, rules, side // 3, age)
+
+
+@kernel
+def call_hinges(
+    mesh: HalfEdgeMesh, state: FilmState, agenda: Agenda, h: int, g: int, log: EventLog, first_split: int
+) -> None:
+    """Have the vertices of the fringe packed anew that are opposite to the broken edge of h and g, or whose
+    hinges have a corner that the log's splits from `first_split` on have replaced.
+    """
+    tail, twin, half_edge, separated = mesh.tail, mesh.twin, mesh.half_edge, state.separated
+    fringe, membership, counts = agenda.fringe, agenda.membership, agenda.counts
+    for apex in (tail[prev_of(h)], tail[prev_of(g)]):
+        if not separated[apex]:
+            join_fringe(apex, fringe, membership, counts)
+    for i in range(first_split, log.counts[0]):
+        disturb_round(
+            half_edge[log.splits[i, 0]], tail, twin, separated, state.disturbed, fringe, membership, counts
+        )
+
+
+@kernel
+def make_tip(mesh: HalfEdgeMesh, state: FilmState, agenda: Agenda, v: int, source: int) -> None:
+    """Make vertex v the tip of a crack that comes from the origin `source`."""
+    edges, twin, step = agenda.edges, mesh.twin, agenda.counts[STEP]
+    state.is_tip[v] = True
+    rest_direction(mesh, source, mesh.origin[v], state.crack_direction[v])
+    leaving = mesh.half_edge[v]
+    while leaving >= 0:
+        call_edge(edges, twin, leaving, step + 1)
+        leaving = twin[prev_of(leaving)]
+
+
+@kernel
+def fray(mesh: HalfEdgeMesh, state: FilmState, agenda: Agenda, f: int, age: float) -> None:
+    """Let the cohesion of face f fall from an age on, if it does not already."""
+    if age < state.fray_age[f]:
+        state.fray_age[f] = age
+        for h in range(3 * f, 3 * f + 3):
+            call_edge(agenda.edges, mesh.twin, h, agenda.counts[STEP] + 1)

@@ -6,70 +6,73 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from weathercoat.compile import kernel
-from weathercoat.film.state import FilmState
+from weathercoat.film.state import FilmRules, FilmState, face_tension
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
-from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.mesh.surface import Vectors
 
 
 @kernel
-def lift_factor_now(
-    h: int,
-    positions: Vectors,
-    tail: Indices,
-    twin: Indices,
-    separated: NDArray[np.bool_],
-    rest_factor: Vectors,
-    convexity: float,
-) -> float:
-    """1 / (1 + exp(-a (phi - pi))) of half-edge h with its present dihedral; one without a twin lifts as if
-    flat.
-
-    The apex of h is attached. Where the other three corners of the hinge are too, it has not moved since the
-    start.
-    """
-    g = twin[h]
-    if g < 0:
-        return 0.5
-    if not (separated[tail[h]] or separated[tail[next_of(h)]] or separated[tail[prev_of(g)]]):
-        return rest_factor[h]
-    return 1.0 / (1.0 + math.exp(-convexity * half_edge_bend(h, positions, tail, twin)))
+def sigmoid(bend: float, convexity: float) -> float:
+    """1 / (1 + exp(-a (phi - pi))), by which a hinge lifts (eq. 1): a half where flat, more on a ridge."""
+    return 1.0 / (1.0 + math.exp(-convexity * bend))
 
 
 @kernel
-def lift_on(
-    first: int,
-    positions: Vectors,
-    tail: Indices,
-    twin: Indices,
-    separated: NDArray[np.bool_],
-    rest_factor: Vectors,
-    convexity: float,
-    face_tension: Vectors,
-    per_valence: bool,
-) -> float:
-    """Sum of tension times lift factor over the half-edges opposite to an attached vertex.
+def sigmoid_bound(sine: float, cosine: float, convexity: float) -> float:
+    """No less than the sigmoid of the bend with this sine and cosine, which may have a common factor.
 
-    first: the half-edge at which the vertex's fan begins.
-    per_valence scales the sum to six half-edges, so that valence and rim do not matter.
+    Without transcendental functions. A ridge: the continued fraction of the arc tangent t / (1 + t^2 / (3 +
+    4 t^2 / 5)) is above it, and the sigmoid is concave, so below its tangents at 0 and 1.5. A valley: 3 t /
+    (3 + t^2) is below the arc tangent, and exp(y) above 1 + y + y^2 / 2.
     """
+    if sine > 0.0:
+        if cosine <= 0.0:
+            return 1.0
+        t = sine / cosine
+        x = convexity * t * (15.0 + 4.0 * t * t) / (15.0 + 9.0 * t * t)
+        return min(0.5 + 0.25 * x, 0.5940 + 0.1492 * x, 1.0)
+    if cosine > 0.0:
+        t = -sine / cosine
+        y = convexity * 3.0 * t / (3.0 + t * t)
+    else:
+        y = convexity * 1.5  # a bend beyond a right angle
+    return 1.0 / (2.0 + y + 0.5 * y * y)
+
+
+@kernel
+def lift_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, v: int, age: float) -> float:
+    """What lifts the attached vertex v, per lift coefficient and, unless the faces' own tension lifts, per
+    drying tension.
+
+    It is the sum over the half-edges opposite to the vertex of the sigmoid of their present bend, times the
+    tension of their face where that lifts. A half-edge without a twin lifts as if flat, and a hinge whose
+    corners are all attached has not moved since the start. `lift_per_valence` scales the sum to six
+    half-edges, so that valence and rim do not matter.
+    """
+    positions, tail, twin, separated = mesh.positions, mesh.tail, mesh.twin, state.separated
     total = 0.0
     count = 0
+    first = mesh.half_edge[v]
     leaving = first
     while leaving >= 0:
         h = next_of(leaving)
-        total += face_tension[h // 3] * lift_factor_now(
-            h, positions, tail, twin, separated, rest_factor, convexity
-        )
+        g = twin[h]
+        if g < 0:
+            factor = 0.5
+        elif not (separated[tail[h]] or separated[tail[next_of(h)]] or separated[tail[prev_of(g)]]):
+            factor = state.lift_factor[h]
+        else:
+            factor = sigmoid(half_edge_bend(h, positions, tail, twin), rules.lift_convexity)
+        if rules.lifts_by_face:
+            factor *= face_tension(state, rules, h // 3, age)
+        total += factor
         count += 1
         leaving = twin[prev_of(leaving)]
         if leaving == first:
             break
-    if per_valence and count > 0:
+    if rules.lift_per_valence and count > 0:
         total *= 6.0 / count
     return total
 
@@ -77,86 +80,15 @@ def lift_on(
 @kernel
 def sum_rest_lift(mesh: HalfEdgeMesh, rest_factor: Vectors, per_valence: bool, out: Vectors) -> None:
     """The sum of `lift_on` for each vertex of the film at rest, under a tension of 1, into out (n0,)."""
-    attached = np.zeros(len(out), np.bool_)
-    ones = np.ones(len(mesh.alive))
     for v in range(len(out)):
-        out[v] = lift_on(
-            mesh.half_edge[v],
-            mesh.positions,
-            mesh.tail,
-            mesh.twin,
-            attached,
-            rest_factor,
-            0.0,
-            ones,
-            per_valence,
-        )
-
-
-@kernel
-def find_overcome(
-    mesh: HalfEdgeMesh,
-    state: FilmState,
-    convexity: float,
-    per_valence: bool,
-    lift_scale: float,
-    adhesion_loss: float,
-    face_tension: Vectors,
-    is_uniform: bool,
-    out: Indices,
-) -> int:
-    """Collect in out the attached vertices with `lift_scale` times their sum above their adhesion; returns
-    how many.
-
-    Adhesion is that at the start less `adhesion_loss`, not below 0. Where the tension is the same everywhere,
-    vertices round which nothing has moved keep the sum that they had at the start, `rest_lift`.
-    """
-    positions, tail, twin, half_edge, origin = (
-        mesh.positions,
-        mesh.tail,
-        mesh.twin,
-        mesh.half_edge,
-        mesh.origin,
-    )
-    separated, disturbed, adhesion = state.separated, state.disturbed, state.adhesion
-    rest_factor, rest_lift = state.lift_factor, state.rest_lift
-    found = 0
-    # vertices beyond the first ones are copies at cracks, which have all separated
-    for v in range(len(adhesion)):
-        if separated[v] or half_edge[v] < 0:
-            continue
-        if is_uniform and not disturbed[v]:
-            total = rest_lift[v]
-        else:
-            total = lift_on(
-                half_edge[v],
-                positions,
-                tail,
-                twin,
-                separated,
-                rest_factor,
-                convexity,
-                face_tension,
-                per_valence,
-            )
-        if lift_scale * total > max(adhesion[origin[v]] - adhesion_loss, 0.0):
-            out[found] = v
-            found += 1
-    return found
-
-
-@kernel
-def disturb(mesh: HalfEdgeMesh, state: FilmState, vertices: Indices) -> None:
-    """Mark the vertices whose lift depends on one of these, which move from now on."""
-    tail, twin, half_edge, disturbed = mesh.tail, mesh.twin, mesh.half_edge, state.disturbed
-    for v in vertices:
-        leaving = half_edge[v]
+        total = 0.0
+        count = 0
+        first = mesh.half_edge[v]
+        leaving = first
         while leaving >= 0:
-            h = next_of(leaving)
-            disturbed[tail[h]] = True
-            disturbed[tail[next_of(h)]] = True
-            if twin[h] >= 0:
-                disturbed[tail[prev_of(twin[h])]] = True
-            leaving = twin[prev_of(leaving)]
-            if leaving == half_edge[v]:
+            total += rest_factor[next_of(leaving)]
+            count += 1
+            leaving = mesh.twin[prev_of(leaving)]
+            if leaving == first:
                 break
+        out[v] = total * (6.0 / count) if per_valence and count > 0 else total

@@ -60,7 +60,6 @@ def make_film_state(
         tension=np.full(face_count, p.tension_initial),
         tension_age=np.zeros(face_count),
         tension_cap=np.ones(face_count),
-        tension_now=np.full(face_count, p.tension_initial),
         relief=np.zeros((face_count, 3)),
         fray_age=np.full(face_count, np.inf),
         cohesion=layout.cohesion,

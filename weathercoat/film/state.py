@@ -58,16 +58,24 @@ class FilmParameters:
 
 
 class FilmRules(NamedTuple):
-    """The parameters that kernels need while edges break, as numbers."""
+    """The parameters that kernels need, as numbers."""
 
     saturating: bool
     tension_initial: float
     tension_rate: float
+    adhesion_loss_rate: float
+    lift_coefficient: float
+    lift_convexity: float
+    lift_per_valence: bool
+    lifts_by_face: bool
     cohesion_decay_rate: float
     direction_threshold: float
     direction_factor: float
     shear_lag: float  # 0 where a break relaxes its two faces only
     face_factor: float
+    crack_speed: float  # infinite where each step has one round of fracture
+    drops_islands: bool
+    hanging_share: float
 
 
 class FilmState(NamedTuple):
@@ -76,13 +84,13 @@ class FilmState(NamedTuple):
     Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite
     while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
     there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at its
-    last event, the age of it, and what it tends to; tension_now (m,), evaluated at the age of the step;
-    relief (m, 3), the direction at rest of the broken edge that relaxed the face most, zero where none did;
-    fray_age (m,), when the face got its first broken edge, infinite before. Half-edges: cohesion (3 m,)
-    before fraying; lift_factor (3 m,), the sigmoid of the dihedral at rest; tie uint64 (3 m,), a hash of the
-    edge's rest midpoint that decides between equals. crack_budget: (1,), the fraction of a round of fracture
-    carried over between steps. mean_edge: mean rest length of the edges. rest_lift (n0,): what the film lifts
-    with at tension 1 while nothing round the vertex has moved; disturbed bool (3 m,), where something has.
+    last event, the age of it, and what it tends to; relief (m, 3), the direction at rest of the broken edge
+    that relaxed the face most, zero where none did; fray_age (m,), when the face got its first broken edge,
+    infinite before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the
+    dihedral at rest; tie uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals.
+    crack_budget: (1,), the fraction of a round of fracture carried over between steps. mean_edge: mean rest
+    length of the edges. rest_lift (n0,): what the film lifts with at tension 1 while nothing round the vertex
+    has moved; disturbed bool (3 m,), the attached vertices round which something has.
     """
 
     adhesion: Vectors
@@ -93,7 +101,6 @@ class FilmState(NamedTuple):
     tension: Vectors
     tension_age: Vectors
     tension_cap: Vectors
-    tension_now: Vectors
     relief: Vectors
     fray_age: Vectors
     cohesion: Vectors
@@ -112,11 +119,19 @@ def make_film_rules(parameters: FilmParameters) -> FilmRules:
         saturating=p.tension_law == "saturating",
         tension_initial=p.tension_initial,
         tension_rate=p.tension_rate,
+        adhesion_loss_rate=p.adhesion_decay_rate * p.adhesion_base,
+        lift_coefficient=p.lift_coefficient,
+        lift_convexity=p.lift_convexity,
+        lift_per_valence=p.lift_sum == "per_valence",
+        lifts_by_face=p.lift_tension == "face",
         cohesion_decay_rate=p.cohesion_decay_rate,
         direction_threshold=p.fracture_direction_threshold,
         direction_factor=p.fracture_direction_factor,
         shear_lag=p.fracture_shear_lag if p.fracture_relaxation == "shear_lag" else 0.0,
         face_factor=p.fracture_face_factor,
+        crack_speed=p.fracture_speed if p.fracture_rounds == "by_speed" else math.inf,
+        drops_islands=p.flaking_rule == "islands",
+        hanging_share=p.flaking_hanging_share,
     )
 
 
@@ -129,24 +144,25 @@ def tension_at(value: float, since: float, cap: float, rate: float, saturating: 
 
 
 @kernel
-def evaluate_tension(state: FilmState, rules: FilmRules, age: float) -> None:
-    """Bring `tension_now` of every face to an age."""
-    tension, tension_age, tension_cap, now = (
-        state.tension,
-        state.tension_age,
-        state.tension_cap,
-        state.tension_now,
-    )
-    for f in range(len(now)):
-        now[f] = tension_at(
-            tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age
-        )
-
-
-def drying_tension(parameters: FilmParameters, age: float) -> float:
+def drying_tension(rules: FilmRules, age: float) -> float:
     """Tension of a film that nothing has relaxed, at an age."""
-    p = parameters
-    return float(tension_at(p.tension_initial, 0.0, 1.0, p.tension_rate, p.tension_law == "saturating", age))
+    return tension_at(rules.tension_initial, 0.0, 1.0, rules.tension_rate, rules.saturating, age)
+
+
+@kernel
+def face_tension(state: FilmState, rules: FilmRules, f: int, age: float) -> float:
+    """Tension of face f at an age."""
+    return tension_of(state.tension, state.tension_age, state.tension_cap, rules, f, age)
+
+
+@kernel
+def tension_of(
+    tension: Vectors, tension_age: Vectors, tension_cap: Vectors, rules: FilmRules, f: int, age: float
+) -> float:
+    """As `face_tension`, from the arrays of the state; at the age of the last event just what that left."""
+    if age == tension_age[f]:
+        return tension[f]
+    return tension_at(tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age)
 
 
 def adhesion_at(adhesion: Vectors, parameters: FilmParameters, age: float) -> Vectors:

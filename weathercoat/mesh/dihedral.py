@@ -21,8 +21,11 @@ from weathercoat.mesh.surface import Indices, Vectors
 
 
 @kernel
-def bend_angle(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> float:
-    """Signed bend of the edge p1 p2 [rad]; 0 where a face or the edge has no extent."""
+def bend_direction(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> tuple[float, float]:
+    """Sine and cosine of the bend of the edge p1 p2, times the product of twice the faces' areas.
+
+    0 and 1, those of a flat one, where a face or the edge has no extent.
+    """
     ex = positions[p2, 0] - positions[p1, 0]
     ey = positions[p2, 1] - positions[p1, 1]
     ez = positions[p2, 2] - positions[p1, 2]
@@ -37,9 +40,16 @@ def bend_angle(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> float:
     length = math.sqrt(ex * ex + ey * ey + ez * ez)
     cosine = mx * nx + my * ny + mz * nz
     if length == 0.0 or (mx * mx + my * my + mz * mz) == 0.0 or (nx * nx + ny * ny + nz * nz) == 0.0:
-        return 0.0
+        return 0.0, 1.0
     triple = (my * nz - mz * ny) * ex + (mz * nx - mx * nz) * ey + (mx * ny - my * nx) * ez
-    return math.atan2(triple / length, cosine)
+    return triple / length, cosine
+
+
+@kernel
+def bend_angle(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> float:
+    """Signed bend of the edge p1 p2 [rad]; 0 where a face or the edge has no extent."""
+    sine, cosine = bend_direction(positions, p1, p2, p3, p4)
+    return math.atan2(sine, cosine)
 
 
 @kernel

@@ -10,15 +10,15 @@ import numpy as np
 
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
 from weathercoat.deform.deformation import DeformParameters, Residual, deform, measure_residual
+from weathercoat.film.agenda import Agenda, make_agenda
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
-from weathercoat.film.separation import find_separating, separate
+from weathercoat.film.separation import separate
 from weathercoat.film.start import FilmLayout, lay_out_film, make_film_state
 from weathercoat.film.state import (
     FilmParameters,
     FilmState,
     adhesion_at,
-    evaluate_tension,
     make_film_rules,
 )
 from weathercoat.mesh.frame import Frame, make_frame
@@ -64,10 +64,12 @@ class Simulation:
     )
     log: EventLog = field(init=False)
     runoff: Runoff = field(init=False)
+    agenda: Agenda = field(init=False)
 
     def __post_init__(self) -> None:
         self.log = make_event_log(len(self.mesh.faces))
         self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
+        self.agenda = make_agenda(self.mesh, self.film, make_film_rules(self.film_parameters))
 
     @property
     def age(self) -> float:
@@ -85,16 +87,13 @@ class Simulation:
         started = time.perf_counter()
         self.log.clear()
 
-        evaluate_tension(self.film, make_film_rules(self.film_parameters), age)
-
-        separating = find_separating(self.mesh, self.film, self.film_parameters, age)
-        separate(self.mesh, self.film, separating, age)
+        separating = separate(self.mesh, self.film, self.agenda, self.film_parameters, age, tick)
         release(self.mesh, self.constraints, separating, age)
         rust_room.expose_lifted(self.mesh, self.rust, separating, age)
 
-        fracture(self.mesh, self.film, self.film_parameters, age, tick, self.log)
+        fracture(self.mesh, self.film, self.agenda, self.film_parameters, age, tick, self.log)
 
-        fallen = flake(self.mesh, self.film, self.film_parameters, age, len(separating), self.log)
+        fallen = flake(self.mesh, self.film, self.agenda, self.film_parameters, age, separating, self.log)
         self.flake_areas.extend(fallen.tolist())
         follow_events(self.mesh, self.constraints, self.log)
         decided = time.perf_counter()
