@@ -129,7 +129,8 @@ def test_linear_tension_grows_without_cap() -> None:
 @pytest.mark.parametrize("law", ["saturating", "linear"])
 def test_an_intact_face_has_the_drying_tension(law: str) -> None:
     film = make_film(zoo.make_disc(), tension_law=law, tension_initial=0.1, tension_rate=2.0)
-    for age in (0.0, 0.3, 5.0):
+    assert (film.tension(0.0) == 0.1).all()
+    for age in (0.1, 0.3, 5.0):
         assert (film.tension(age) == drying_tension(film.rules, age)).all()
     expected = 1.0 - 0.9 * np.exp(-10.0) if law == "saturating" else 10.1
     assert drying_tension(film.rules, 5.0) == pytest.approx(expected, rel=1e-14)
