@@ -45,15 +45,17 @@ def simulate(
     overrides: Sequence[str] = (),
     *,
     until: float = 1.0,
+    threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Simulation:
     """Age a surface as it is, without remeshing it, and return the simulation where it stands.
 
     config: a YAML file or the name of a shipped config; overrides: `key.path=value`, as for `--set`. until:
     share of the run to simulate; call the result's `step()` to go on, `snapshot()` for its film and metal.
-    progress: called with the steps done and their number.
+    threads: how many share a step's work; their number changes no result. progress: called with the steps
+    done and their number.
     """
-    simulation = prepare_simulation(surface, load_config(config, overrides).config)
+    simulation = prepare_simulation(surface, load_config(config, overrides).config, threads=threads)
     run_simulation(simulation, [], progress, until=round(until * simulation.steps))
     return simulation
 

@@ -74,6 +74,7 @@ def run_asset(
     format: str | None = None,
     overwrite: bool = False,
     strict: bool = False,
+    threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
     log: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
@@ -81,8 +82,9 @@ def run_asset(
     `timing`.
 
     model: a path, or a binary stream, for which `format` may be given. strict: any warning ends the run with
-    StrictError. progress: called with the steps done and their number. log: called with each warning and with
-    what was done, a line each. Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
+    StrictError. threads: how many share a step's work; their number changes no result. progress: called with
+    the steps done and their number. log: called with each warning and with what was done, a line each.
+    Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
     """
     config = loaded.config
     say = log or (lambda line: None)
@@ -98,7 +100,7 @@ def run_asset(
                 meshed = _remeshed(painted, config)
             report_notes(meshed.notes[len(surface.notes) :], name, say, strict=strict)
             with watch.time("prepare"):
-                simulation = prepare_simulation(meshed, config, painted)
+                simulation = prepare_simulation(meshed, config, painted, threads=threads)
         recorder = _SnapshotRecorder(folder, config, untouched, watch)
         due = config.snapshots.due(config.ageing.steps)
         run_simulation(simulation, [Recorder(due, recorder.record)], progress)
@@ -212,7 +214,9 @@ def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | No
     return surface.select_faces(keep), surface.select_faces(~keep)
 
 
-def prepare_simulation(surface: Surface, config: Config, painted: Surface | None = None) -> Simulation:
+def prepare_simulation(
+    surface: Surface, config: Config, painted: Surface | None = None, *, threads: int = 1
+) -> Simulation:
     """A simulation of a surface by a config, at age 0.
 
     painted: the surface before remeshing, whose frame places noise and defects, so that they lie alike at
@@ -234,6 +238,7 @@ def prepare_simulation(surface: Surface, config: Config, painted: Surface | None
             duration=config.ageing.duration,
             seed=config.seed,
             frame=None if painted is None else make_frame(painted),
+            threads=threads,
         )
     except ValueError as error:
         raise CheckError(f"the mesh for the simulation is no manifold: {error}", file=surface.name) from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.sim.runs import make_run
 from weathercoat.deform.constraints import Constraints, make_constraints
-from weathercoat.deform.deformation import deform
+from weathercoat.deform.deformation import DeformParameters, deform
 from weathercoat.deform.plain import deform_plainly, find_active
 from weathercoat.deform.runs import LANES, TILE, Runs, bucket
 from weathercoat.mesh.halfedge import HalfEdgeMesh, make_half_edges
@@ -117,22 +119,23 @@ def check_packing(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
     data = np.stack([constraints.angle_start[h], constraints.angle_age[h], constraints.span[h]], axis=1)
     assert (angles.data[lanes // LANES, :, lanes % LANES] == data).all()
     planes = constraints.planes
-    assert np.flatnonzero(planes.lane >= 0).tolist() == active.free.tolist()
-    lanes = planes.lane[active.free]
-    assert (planes.vertex[lanes // LANES, lanes % LANES] == active.free).all()
-    normals = planes.plane[lanes // LANES, :3, lanes % LANES]
-    assert (normals == mesh.rest_normals[mesh.origin[active.free]]).all()
+    assert np.flatnonzero(planes.place >= 0).tolist() == active.free.tolist()
+    places = planes.place[active.free]
+    assert (planes.vertex[places] == active.free).all()
+    assert (planes.plane[places, :3] == mesh.rest_normals[mesh.origin[active.free]]).all()
 
 
 def step_beside(simulation: Simulation) -> None:
     """One step, with the packing checked, and its deformation done over again plainly."""
     import weathercoat.sim.simulation as module
 
-    def both(mesh: HalfEdgeMesh, constraints: Constraints, parameters: object, age: float) -> None:
+    def both(
+        mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float, **how: Any
+    ) -> None:
         check_packing(mesh, constraints)
         beside = mesh._replace(positions=mesh.positions.copy())
-        deform_plainly(beside, constraints, parameters, age)  # type: ignore[arg-type]
-        deform(mesh, constraints, parameters, age)  # type: ignore[arg-type]
+        deform_plainly(beside, constraints, parameters, age)
+        deform(mesh, constraints, parameters, age, **how)
         used = mesh.vertex_count
         assert beside.positions[:used].tobytes() == mesh.positions[:used].tobytes()
 

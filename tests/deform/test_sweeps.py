@@ -61,7 +61,7 @@ def active_hinges(mesh: HalfEdgeMesh, constraints: Constraints) -> set[tuple[int
 
 
 def free_vertices(constraints: Constraints) -> list[int]:
-    return np.flatnonzero(constraints.planes.lane >= 0).tolist()
+    return np.flatnonzero(constraints.planes.place >= 0).tolist()
 
 
 # --- what is active ---

@@ -56,6 +56,7 @@ CURL = {
     "deformation_sweeps": 5,
     "deformation_angle": "dihedral",
     "deformation_angle_stiffness": 1.0,
+    "deformation_sleep_tolerance": 0.0,
 }
 STAIN = {
     "dust_rate": 0.5,

@@ -53,6 +53,12 @@ model_format = click.option(
     metavar="NAME",
     help="Format of the model, where its content and extension do not tell.",
 )
+threads = click.option(
+    "--threads",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Threads that share the work of a large film; all cores, at most 4, by default. Changes no result.",
+)
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
 overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")

@@ -17,6 +17,8 @@ from weathercoat.errors import UsageError
 if TYPE_CHECKING:
     from weathercoat.config.load import Override
 
+_MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
+
 
 @click.command()
 @options.config
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 @options.steps
 @options.faces
 @options.model_format
+@options.threads
 @options.overwrite
 @options.strict
 @options.quiet
@@ -42,6 +45,7 @@ def command(
     steps: int | None,
     faces: int | None,
     model_format: str | None,
+    threads: int | None,
     overwrite: bool,
     strict: bool,
     quiet: bool,
@@ -63,6 +67,7 @@ def command(
     stem = "model" if is_piped else Path(model).stem
     folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
+        from weathercoat.deform.team import usable_cores
         from weathercoat.run import run_asset
 
         report = run_asset(
@@ -72,6 +77,7 @@ def command(
             format=model_format,
             overwrite=overwrite,
             strict=strict,
+            threads=threads or min(usable_cores(), _MOST_THREADS),
             progress=messages.progress,
             log=messages.log,
         )

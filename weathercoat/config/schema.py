@@ -293,6 +293,12 @@ class Deformation(Section):
         "dihedral", "Angle constraint: signed dihedral, the paper's split form, or plain arccos"
     )
     angle_stiffness: Real = parameter(1.0, "Share of an angle correction that is applied", ge=0, le=1)
+    sleep_tolerance: Real = parameter(
+        0.0,
+        "Film sleeps for a few steps while nothing round it moves by this much in one [sizes]; 0: never",
+        ge=0,
+        le=1,
+    )
 
 
 class Dust(Section):

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
-from weathercoat.deform.runs import Runs, activate, deactivate, make_runs
+from weathercoat.deform.runs import LANES, Runs, activate, deactivate, end_constraint, make_runs
 from weathercoat.deform.substrate import Planes, forget, let_move, make_planes
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
 
-@dataclass(frozen=True)
-class Constraints:
+class Constraints(NamedTuple):
     """The state of the constraints and, derived from it and from the mesh, the packed active ones.
 
     Half-edges, by the smaller one of a pair: rest_length (3 m,) [sizes]; span (3 m,), the distance between
     the centres of the two faces at rest; angle_start (3 m,), the bend when the angle constraint was made, NaN
-    without one; angle_age (3 m,). Vertices: inverse_mass (3 m,), 1 once separated.
+    without one; angle_age (3 m,). Vertices: inverse_mass (3 m,), 1 once separated, 0 again while it sleeps;
+    asleep bool (3 m,).
     """
 
     rest_length: Vectors
@@ -29,6 +30,7 @@ class Constraints:
     angle_start: Vectors
     angle_age: Vectors
     inverse_mass: Vectors
+    asleep: NDArray[np.bool_]
     lengths: Runs
     angles: Runs
     planes: Planes
@@ -58,6 +60,7 @@ def make_constraints(mesh: HalfEdgeMesh) -> Constraints:
         angle_start=np.full(len(twin), np.nan),
         angle_age=np.zeros(len(twin)),
         inverse_mass=np.zeros(len(twin)),
+        asleep=np.zeros(len(twin), np.bool_),
         lengths=make_runs(half_edges, np.stack([tail, head], axis=1), half_edges, rest_count, 0),
         angles=make_runs(hinges, corners, hinge_of, rest_count, 3),
         planes=make_planes(mesh),
@@ -71,13 +74,8 @@ def release(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices, age
     The lengths of their edges are held from now on; no end of such an edge had moved before, so that is the
     rest length. A constraint that exists already keeps its start.
     """
-    if len(vertices) == 0:
-        return
-    c = constraints
-    _release(
-        mesh, vertices, age, c.rest_length, c.span, c.angle_start, c.angle_age, c.inverse_mass,
-        c.lengths, c.angles, c.planes,
-    )  # fmt: skip
+    if len(vertices) > 0:
+        _release(mesh, constraints, vertices, age)
 
 
 def follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) -> None:
@@ -86,24 +84,16 @@ def follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) -
     A broken edge loses its angle constraint, and each half-edge keeps a length constraint of its own. Parents
     of copies may be copies of the same step, but all of them have separated.
     """
-    if not log.counts.any():
-        return
-    c = constraints
-    _follow_events(
-        mesh, log, c.rest_length, c.span, c.angle_start, c.angle_age, c.inverse_mass,
-        c.lengths, c.angles, c.planes,
-    )  # fmt: skip
+    if log.counts.any():
+        _follow_events(mesh, constraints, log)
 
 
 @kernel
-def _release(
-    mesh: HalfEdgeMesh, vertices: Indices, age: float, rest_length: Vectors, span: Vectors,
-    angle_start: Vectors, angle_age: Vectors, inverse_mass: Vectors,
-    lengths: Runs, angles: Runs, planes: Planes,
-) -> None:  # fmt: skip
+def _release(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices, age: float) -> None:
+    angle_start = constraints.angle_start
     for v in vertices:
-        inverse_mass[v] = 1.0
-        let_move(mesh, planes, v)
+        constraints.inverse_mass[v] = 1.0
+        let_move(mesh, constraints.planes, v)
         first = mesh.half_edge[v]
         leaving = first
         while leaving >= 0:
@@ -112,106 +102,133 @@ def _release(
             edge = min(h, g)
             if g >= 0 and math.isnan(angle_start[edge]):
                 angle_start[edge] = half_edge_bend(h, mesh.positions, mesh.tail, mesh.twin)
-                angle_age[edge] = age
+                constraints.angle_age[edge] = age
             leaving = mesh.twin[prev_of(leaving)]
             if leaving == first:
                 break
-    for v in vertices:
-        _refresh_round(
-            mesh, v, rest_length, span, angle_start, angle_age, inverse_mass, lengths, angles
-        )  # fmt: skip
+    rouse(mesh, constraints, vertices)
+    refresh_round(mesh, constraints, vertices)
 
 
 @kernel
-def _follow_events(
-    mesh: HalfEdgeMesh, log: EventLog, rest_length: Vectors, span: Vectors,
-    angle_start: Vectors, angle_age: Vectors, inverse_mass: Vectors,
-    lengths: Runs, angles: Runs, planes: Planes,
-) -> None:  # fmt: skip
+def _follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) -> None:
+    lengths, angles, planes = constraints.lengths, constraints.angles, constraints.planes
+    touched = np.empty(4 * log.counts[1] + log.counts[0], np.int32)
+    count = 0
     for i in range(log.counts[1]):
         h, g = log.breaks[i, 0], log.breaks[i, 1]
-        angle_start[min(h, g)] = np.nan
-        deactivate(angles, angles.slot[h])
+        constraints.angle_start[min(h, g)] = np.nan
+        end_constraint(angles, angles.slot[h])
+        for v in (mesh.tail[h], mesh.tail[next_of(h)], mesh.tail[g], mesh.tail[next_of(g)]):
+            touched[count] = v
+            count += 1
     for i in range(log.counts[0]):
-        new = log.splits[i, 0]
-        inverse_mass[new] = 1.0
-        if mesh.half_edge[new] >= 0:
-            let_move(mesh, planes, new)
-    for i in range(log.counts[0]):
-        for side in range(2):
-            _refresh_round(
-                mesh, log.splits[i, side], rest_length, span, angle_start, angle_age, inverse_mass,
-                lengths, angles,
-            )  # fmt: skip
-    for i in range(log.counts[1]):
-        for side in range(2):
-            _refresh(
-                mesh, log.breaks[i, side], rest_length, span, angle_start, angle_age, inverse_mass,
-                lengths, angles,
-            )  # fmt: skip
+        touched[count] = log.splits[i, 0]
+        count += 1
+    # film falls alone or with all that it hangs together with, so what falls has no live neighbour
     for i in range(log.counts[2]):
         for h in range(3 * log.falls[i], 3 * log.falls[i] + 3):
-            deactivate(lengths, lengths.slot[h])
+            end_constraint(lengths, lengths.slot[h])
             if angles.slot[h] >= 0:
-                deactivate(angles, angles.slot[h])
-            if mesh.half_edge[mesh.tail[h]] < 0:
-                forget(mesh, planes, mesh.tail[h])
+                end_constraint(angles, angles.slot[h])
+            forget(mesh, planes, mesh.tail[h])
+    wake(mesh, constraints, touched)
+    rouse(mesh, constraints, touched)
+    refresh_round(mesh, constraints, touched)
 
 
 @kernel
-def _refresh_round(
-    mesh: HalfEdgeMesh, v: int, rest_length: Vectors, span: Vectors,
-    angle_start: Vectors, angle_age: Vectors, inverse_mass: Vectors, lengths: Runs, angles: Runs,
-) -> None:  # fmt: skip
-    """Pack anew every constraint that a vertex takes part in."""
-    first = mesh.half_edge[v]
-    leaving = first
-    while leaving >= 0:
-        arriving = prev_of(leaving)
-        _refresh(
-            mesh, leaving, rest_length, span, angle_start, angle_age, inverse_mass, lengths, angles
-        )  # fmt: skip
-        _refresh(
-            mesh, next_of(leaving), rest_length, span, angle_start, angle_age, inverse_mass, lengths, angles
-        )  # fmt: skip
-        if mesh.twin[arriving] < 0:
-            _refresh(
-                mesh, arriving, rest_length, span, angle_start, angle_age, inverse_mass, lengths, angles
-            )  # fmt: skip
-        leaving = mesh.twin[arriving]
-        if leaving == first:
-            break
+def wake(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices) -> None:
+    """Let film vertices move that have separated, sleepers and new copies among them; not yet packed."""
+    for v in vertices:
+        if mesh.half_edge[v] >= 0:
+            constraints.asleep[v] = False
+            constraints.inverse_mass[v] = 1.0
+            let_move(mesh, constraints.planes, v)
 
 
 @kernel
-def _refresh(
-    mesh: HalfEdgeMesh, h: int, rest_length: Vectors, span: Vectors,
-    angle_start: Vectors, angle_age: Vectors, inverse_mass: Vectors, lengths: Runs, angles: Runs,
-) -> None:  # fmt: skip
-    """Pack the length of an edge, which any of its half-edges names, and its angle, where they are active."""
-    if not mesh.alive[h // 3]:
+def rouse(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices) -> None:
+    """Wake the sleepers that constraints connect with one of the vertices, and pack what they are part of."""
+    tail, twin, half_edge, asleep = mesh.tail, mesh.twin, mesh.half_edge, constraints.asleep
+    if not asleep[: mesh.used[0]].any():
         return
-    g = mesh.twin[h]
-    if 0 <= g < h:
-        h, g = g, h
-    a, b = mesh.tail[h], mesh.tail[next_of(h)]
-    if inverse_mass[a] + inverse_mass[b] > 0.0:
-        block, i = activate(lengths, lengths.slot[h])
-        _set_corner(lengths, block, 0, i, a, inverse_mass)
-        _set_corner(lengths, block, 1, i, b, inverse_mass)
-        lengths.target[block, i] = rest_length[h]
-    if g >= 0 and not math.isnan(angle_start[h]):
-        block, i = activate(angles, angles.slot[h])
-        _set_corner(angles, block, 0, i, a, inverse_mass)
-        _set_corner(angles, block, 1, i, b, inverse_mass)
-        _set_corner(angles, block, 2, i, mesh.tail[prev_of(h)], inverse_mass)
-        _set_corner(angles, block, 3, i, mesh.tail[prev_of(g)], inverse_mass)
-        angles.data[block, 0, i] = angle_start[h]
-        angles.data[block, 1, i] = angle_age[h]
-        angles.data[block, 2, i] = span[h]
+    reached = np.empty(len(vertices) + mesh.used[0], np.int32)
+    reached[: len(vertices)] = vertices
+    count = len(vertices)
+    following = 0
+    while following < count:
+        v = reached[following]
+        following += 1
+        leaving = half_edge[v]
+        while leaving >= 0:
+            h = next_of(leaving)
+            across = tail[prev_of(twin[h])] if twin[h] >= 0 else v
+            for other in (tail[h], tail[next_of(h)], across):
+                if asleep[other]:
+                    asleep[other] = False
+                    reached[count] = other
+                    count += 1
+            leaving = twin[prev_of(leaving)]
+            if leaving == half_edge[v]:
+                break
+    woken = reached[len(vertices) : count]
+    wake(mesh, constraints, woken)
+    refresh_round(mesh, constraints, woken)
 
 
 @kernel
-def _set_corner(runs: Runs, block: int, corner: int, i: int, v: int, inverse_mass: Vectors) -> None:
-    runs.vertices[block, corner, i] = v
-    runs.moves[block, corner, i] = 1 if inverse_mass[v] > 0.0 else 0
+def refresh_round(mesh: HalfEdgeMesh, constraints: Constraints, centres: Indices) -> None:
+    """Pack anew every constraint that one of the vertices takes part in."""
+    tail, twin, half_edge = mesh.tail, mesh.twin, mesh.half_edge
+    mass, rest_length, span = constraints.inverse_mass, constraints.rest_length, constraints.span
+    start, since = constraints.angle_start, constraints.angle_age
+    lengths, angles = constraints.lengths, constraints.angles
+    l_slot, l_run, l_first, l_filled = lengths.slot, lengths.run, lengths.first_block, lengths.filled
+    l_lane, l_slot_at, l_vertices, l_moves = lengths.lane, lengths.slot_at, lengths.vertices, lengths.moves
+    l_data, l_target = lengths.data, lengths.target
+    a_slot, a_run, a_first, a_filled = angles.slot, angles.run, angles.first_block, angles.filled
+    a_lane, a_slot_at, a_vertices, a_moves = angles.lane, angles.slot_at, angles.vertices, angles.moves
+    a_data, a_target = angles.data, angles.target
+    corners = np.empty(4, np.int32)
+    for v in centres:
+        leaving = half_edge[v]
+        while leaving >= 0:
+            arriving = prev_of(leaving)
+            # of a fan that is open, the last half-edge has no leaving one beside it
+            for side in range(3 if twin[arriving] < 0 else 2):
+                h = leaving if side == 0 else (next_of(leaving) if side == 1 else arriving)
+                g = twin[h]
+                if 0 <= g < h:
+                    h, g = g, h
+                corners[0], corners[1], corners[2] = tail[h], tail[next_of(h)], tail[prev_of(h)]
+                if mass[corners[0]] + mass[corners[1]] > 0.0:
+                    lane = activate(l_slot[h], l_run, l_first, l_filled, l_lane, l_slot_at)
+                    for k in range(2):
+                        l_vertices[lane // LANES, k, lane % LANES] = corners[k]
+                        l_moves[lane // LANES, k, lane % LANES] = mass[corners[k]] > 0.0
+                    l_target[lane // LANES, lane % LANES] = rest_length[h]
+                else:
+                    deactivate(
+                        l_slot[h], l_run, l_first, l_filled, l_lane, l_slot_at,
+                        l_vertices, l_moves, l_data, l_target,
+                    )  # fmt: skip
+                if g < 0 or math.isnan(start[h]):
+                    continue
+                corners[3] = tail[prev_of(g)]
+                if mass[corners[0]] + mass[corners[1]] + mass[corners[2]] + mass[corners[3]] > 0.0:
+                    lane = activate(a_slot[h], a_run, a_first, a_filled, a_lane, a_slot_at)
+                    for k in range(4):
+                        a_vertices[lane // LANES, k, lane % LANES] = corners[k]
+                        a_moves[lane // LANES, k, lane % LANES] = mass[corners[k]] > 0.0
+                    a_data[lane // LANES, 0, lane % LANES] = start[h]
+                    a_data[lane // LANES, 1, lane % LANES] = since[h]
+                    a_data[lane // LANES, 2, lane % LANES] = span[h]
+                else:
+                    deactivate(
+                        a_slot[h], a_run, a_first, a_filled, a_lane, a_slot_at,
+                        a_vertices, a_moves, a_data, a_target,
+                    )  # fmt: skip
+            leaving = twin[arriving]
+            if leaving == half_edge[v]:
+                break

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.deform.angle import DIHEDRAL, FORMS
 from weathercoat.deform.constraints import Constraints
-from weathercoat.deform.runs import LANES, Runs
-from weathercoat.deform.sweeps import aim, sweep
-from weathercoat.mesh.dihedral import bend_angle
-from weathercoat.mesh.halfedge import HalfEdgeMesh
+from weathercoat.deform.runs import Runs
+from weathercoat.deform.sleep import Rest, settle
+from weathercoat.deform.sweeps import aim, sweep, sweep_angles, sweep_lengths, sweep_substrate
+from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
+from weathercoat.deform.team import Team
+from weathercoat.mesh.dihedral import half_edge_bend
+from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of
 from weathercoat.mesh.surface import Vectors
+
+_WORTH_SHARING = 10_000  # hinges; below, handing work over costs more than it saves
 
 
 @dataclass(frozen=True)
@@ -32,31 +39,101 @@ class DeformParameters:
     deformation_sweeps: int = 10
     deformation_angle: str = "dihedral"  # or "split", "arccos"
     deformation_angle_stiffness: float = 1.0
+    deformation_sleep_tolerance: float = 0.0
 
 
-def deform(mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float) -> None:
-    """Run the sweeps of one step; changes the positions of separated vertices."""
+def deform(
+    mesh: HalfEdgeMesh,
+    constraints: Constraints,
+    parameters: DeformParameters,
+    age: float,
+    *,
+    team: Team | None = None,
+    rest: Rest | None = None,
+) -> None:
+    """Run the sweeps of one step; changes the positions of separated vertices.
+
+    A team of threads shares the work where there is enough of it; the result is the same bits. `rest` is
+    needed where vertices may sleep.
+    """
     p, c = parameters, constraints
-    form = FORMS[p.deformation_angle]
-    _aim(c.angles, p, age, as_tangent=form == DIHEDRAL)
-    sweep(
-        p.deformation_sweeps,
-        form,
-        p.deformation_angle_stiffness,
-        mesh.positions,
-        c.lengths,
-        c.angles,
-        c.planes,
-    )
+    if team is not None and team.size > 1 and _hinge_count(c.angles) >= _WORTH_SHARING:
+        _deform_together(mesh.positions, c, p, age, team)
+    else:
+        form = FORMS[p.deformation_angle]
+        _aim(c.angles, p, age, as_tangent=form == DIHEDRAL)
+        sweep(
+            p.deformation_sweeps, form, p.deformation_angle_stiffness,
+            mesh.positions, c.lengths, c.angles, c.planes,
+        )  # fmt: skip
+    if p.deformation_sleep_tolerance > 0.0 and rest is not None:
+        settle(mesh, c, rest, p.deformation_sleep_tolerance)
 
 
-def _aim(angles: Runs, parameters: DeformParameters, age: float, *, as_tangent: bool) -> None:
-    """Set the targets of all active hinges for an age."""
+def _deform_together(
+    positions: Vectors, constraints: Constraints, parameters: DeformParameters, age: float, team: Team
+) -> None:
+    """The same sweeps, with the tiles shared among threads.
+
+    What a thread does to a tile, no other tile sees; constraints across tiles are met by one thread.
+    """
+    p, lengths, angles, planes = parameters, constraints.lengths, constraints.angles, constraints.planes
+    form, stiffness = FORMS[p.deformation_angle], p.deformation_angle_stiffness
+    inside, length_tiles, angle_tiles = lengths.inside, len(lengths.tile_run) - 1, len(angles.tile_run) - 1
+    cuts = _cut_evenly(angles, team.size)
+
+    def begin(number: int) -> None:
+        tiles = cuts[number], cuts[number + 1]
+        _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=tiles)
+        sweep_lengths(positions, lengths, *tiles)
+
+    def go_on(number: int) -> None:
+        tiles = cuts[number], cuts[number + 1]
+        sweep_substrate(positions, planes, *tiles)
+        sweep_lengths(positions, lengths, *tiles)
+
+    def bend(number: int) -> None:
+        sweep_angles(form, positions, angles, stiffness, cuts[number], cuts[number + 1])
+
+    def end(number: int) -> None:
+        sweep_substrate(positions, planes, cuts[number], cuts[number + 1])
+
+    _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=(inside, angle_tiles))
+    for number in range(p.deformation_sweeps):
+        team.share(begin if number == 0 else go_on)
+        sweep_lengths(positions, lengths, inside, length_tiles)
+        team.share(bend)
+        sweep_angles(form, positions, angles, stiffness, inside, angle_tiles)
+    if p.deformation_sweeps > 0:
+        team.share(end)
+
+
+def _hinge_count(angles: Runs) -> int:
+    """Active hinges."""
+    return int(angles.filled.sum())
+
+
+def _cut_evenly(angles: Runs, parts: int) -> list[int]:
+    """Bounds, (parts + 1,), of ranges of the tiles inside that hold about equally many active hinges."""
+    before = np.concatenate([[0], np.cumsum(angles.filled)])[angles.tile_run[: angles.inside + 1]]
+    wanted = before[-1] * np.arange(1, parts) / parts
+    return [0, *np.searchsorted(before, wanted).tolist(), angles.inside]
+
+
+def _aim(
+    angles: Runs,
+    parameters: DeformParameters,
+    age: float,
+    *,
+    as_tangent: bool,
+    tiles: tuple[int, int] | None = None,
+) -> None:
+    """Set the targets of active hinges for an age, of all tiles or of a range."""
     p = parameters
     by_curvature = p.curl_rule == "curvature"
     rate = p.curl_rate if by_curvature else p.curl_angle_rate
-    tiles = len(angles.tile_run) - 1
-    aim(angles, by_curvature, p.curl_radius, rate, p.curl_angle_floor, as_tangent, age, 0, tiles)
+    first, last = tiles or (0, len(angles.tile_run) - 1)
+    aim(angles, by_curvature, p.curl_radius, rate, p.curl_angle_floor, as_tangent, age, first, last)
 
 
 @dataclass(frozen=True)
@@ -74,12 +151,25 @@ class Residual:
 def measure_residual(
     mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float
 ) -> Residual:
-    """The residual of the active constraints at an age; zeros where there are none."""
-    _aim(constraints.angles, parameters, age, as_tangent=False)
-    strain = np.zeros(len(constraints.lengths.lane))
-    error = np.zeros(len(constraints.angles.lane))
-    strains = _strains(mesh.positions, constraints.lengths, strain)
-    errors = _errors(mesh.positions, constraints.angles, error)
+    """The residual of all constraints of separated film at an age, sleepers included; zeros without any."""
+    p, c = parameters, constraints
+    is_free = (c.inverse_mass > 0.0) | c.asleep
+    strain, error = np.zeros(len(mesh.twin)), np.zeros(len(mesh.twin))
+    strains = _strains(mesh, is_free, c.rest_length, strain)
+    by_curvature = p.curl_rule == "curvature"
+    rate = p.curl_rate if by_curvature else p.curl_angle_rate
+    errors = _errors(
+        mesh,
+        c.angle_start,
+        c.angle_age,
+        c.span,
+        by_curvature,
+        p.curl_radius,
+        rate,
+        p.curl_angle_floor,
+        age,
+        error,
+    )
     strain, error = strain[:strains], error[:errors]
     return Residual(
         float(np.sqrt(np.mean(strain**2))) if strains else 0.0,
@@ -90,30 +180,36 @@ def measure_residual(
 
 
 @kernel
-def _strains(positions: Vectors, lengths: Runs, out: Vectors) -> int:
-    """Unsigned strain of the active lengths that have one, by slots; returns how many."""
+def _strains(mesh: HalfEdgeMesh, is_free: NDArray[np.bool_], rest_length: Vectors, out: Vectors) -> int:
+    """Unsigned strain of the live edges that have a free end and a length; returns how many."""
     found = 0
-    for lane in lengths.lane:
-        if lane < 0 or lengths.target[lane // LANES, lane % LANES] == 0.0:
+    for h in range(len(mesh.twin)):
+        a, b = mesh.tail[h], mesh.tail[next_of(h)]
+        if not mesh.alive[h // 3] or 0 <= mesh.twin[h] < h or not (is_free[a] or is_free[b]):
             continue
-        b, i = lane // LANES, lane % LANES
-        span = positions[lengths.vertices[b, 0, i]] - positions[lengths.vertices[b, 1, i]]
-        length = np.sqrt(span[0] * span[0] + span[1] * span[1] + span[2] * span[2])
-        out[found] = abs(length / lengths.target[b, i] - 1.0)
-        found += 1
+        if rest_length[h] > 0.0:
+            squared = 0.0
+            for axis in range(3):
+                squared += (mesh.positions[a, axis] - mesh.positions[b, axis]) ** 2
+            out[found] = abs(math.sqrt(squared) / rest_length[h] - 1.0)
+            found += 1
     return found
 
 
 @kernel
-def _errors(positions: Vectors, angles: Runs, out: Vectors) -> int:
-    """Unsigned error of the active hinges, whose targets are bends, by slots; returns how many."""
+def _errors(
+    mesh: HalfEdgeMesh, start: Vectors, since: Vectors, span: Vectors,
+    by_curvature: bool, radius: float, rate: float, floor: float, age: float, out: Vectors,
+) -> int:  # fmt: skip
+    """Unsigned error of the live hinges that have a target; returns how many."""
     found = 0
-    for lane in angles.lane:
-        if lane < 0:
+    for h in range(len(mesh.twin)):
+        if not mesh.alive[h // 3] or mesh.twin[h] < h or math.isnan(start[h]):
             continue
-        b, i = lane // LANES, lane % LANES
-        v = angles.vertices[b]
-        bend = bend_angle(positions, v[0, i], v[1, i], v[2, i], v[3, i])
-        out[found] = abs(bend - angles.target[b, i])
+        if by_curvature:
+            wanted = curved_bend(start[h], span[h], radius, share_grown(rate * (age - since[h])))
+        else:
+            wanted = shrunk_bend(start[h], rate * (age - since[h]), floor)
+        out[found] = abs(half_edge_bend(h, mesh.positions, mesh.tail, mesh.twin) - wanted)
         found += 1
     return found

@@ -48,8 +48,10 @@ def find_active(mesh: HalfEdgeMesh, constraints: Constraints) -> Active:
     for h in constraints.angles.half_edge.tolist():
         g = twin[h]
         if mesh.alive[h // 3] and g >= 0 and not math.isnan(constraints.angle_start[h]):
-            hinges.append((tail[h], tail[next_of(h)], tail[prev_of(h)], tail[prev_of(g)]))
-            hinge_edges.append(h)
+            hinge = tail[h], tail[next_of(h)], tail[prev_of(h)], tail[prev_of(g)]
+            if any(mass[v] > 0.0 for v in hinge):
+                hinges.append(hinge)
+                hinge_edges.append(h)
     used = np.arange(mesh.vertex_count)
     return Active(
         np.array(ends, np.int32).reshape(-1, 2),

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.compile import kernel
+from weathercoat.compile import formula, kernel
 from weathercoat.mesh.surface import Indices, Vectors
 
 LANES = 16  # constraints that are met at once: two registers of 8, which hide each other's latency
@@ -162,38 +162,45 @@ def _color(
         tile_colors[t] = most
 
 
-@kernel
-def activate(runs: Runs, slot: int) -> tuple[int, int]:
-    """The block and the lane of a constraint, which is active from now on; the caller fills them."""
-    lane = runs.lane[slot]
-    if lane < 0:
-        run = runs.run[slot]
-        lane = LANES * runs.first_block[run] + runs.filled[run]
-        runs.filled[run] += 1
-        runs.lane[slot] = lane
-        runs.slot_at[lane] = slot
-    return lane // LANES, lane % LANES
+@formula
+def activate(
+    slot: int, run: Indices, first_block: Indices, filled: Indices, lane: Indices, slot_at: Indices
+) -> int:
+    """The lane of a constraint, which is active from now on; the caller fills it."""
+    if lane[slot] < 0:
+        r = run[slot]
+        lane[slot] = LANES * first_block[r] + filled[r]
+        slot_at[lane[slot]] = slot
+        filled[r] += 1
+    return lane[slot]
 
 
-@kernel
-def deactivate(runs: Runs, slot: int) -> None:
+@formula
+def deactivate(
+    slot: int, run: Indices, first_block: Indices, filled: Indices, lane: Indices, slot_at: Indices,
+    vertices: Indices, moves: NDArray[np.uint8], data: Vectors, target: Vectors,
+) -> None:  # fmt: skip
     """End a constraint, if it is active: the last one of its run takes its lane."""
-    lane = runs.lane[slot]
-    if lane < 0:
-        return
-    run = runs.run[slot]
-    runs.filled[run] -= 1
-    last = LANES * runs.first_block[run] + runs.filled[run]
-    runs.lane[slot] = -1
-    if last == lane:
-        return
-    b, i, c, j = lane // LANES, lane % LANES, last // LANES, last % LANES
-    for k in range(runs.vertices.shape[1]):
-        runs.vertices[b, k, i] = runs.vertices[c, k, j]
-        runs.moves[b, k, i] = runs.moves[c, k, j]
-    for k in range(runs.data.shape[1]):
-        runs.data[b, k, i] = runs.data[c, k, j]
-    runs.target[b, i] = runs.target[c, j]
-    moved = runs.slot_at[last]
-    runs.slot_at[lane] = moved
-    runs.lane[moved] = lane
+    if lane[slot] >= 0:
+        r = run[slot]
+        filled[r] -= 1
+        last = LANES * first_block[r] + filled[r]
+        b, i, c, j = lane[slot] // LANES, lane[slot] % LANES, last // LANES, last % LANES
+        for k in range(vertices.shape[1]):
+            vertices[b, k, i] = vertices[c, k, j]
+            moves[b, k, i] = moves[c, k, j]
+        for k in range(data.shape[1]):
+            data[b, k, i] = data[c, k, j]
+        target[b, i] = target[c, j]
+        lane[slot_at[last]] = lane[slot]
+        slot_at[lane[slot]] = slot_at[last]
+        lane[slot] = -1
+
+
+@kernel
+def end_constraint(runs: Runs, slot: int) -> None:
+    """End a constraint, if it is active."""
+    deactivate(
+        slot, runs.run, runs.first_block, runs.filled, runs.lane, runs.slot_at,
+        runs.vertices, runs.moves, runs.data, runs.target,
+    )  # fmt: skip

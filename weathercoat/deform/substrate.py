@@ -7,21 +7,21 @@ from typing import NamedTuple
 import numpy as np
 
 from weathercoat.compile import formula, kernel
-from weathercoat.deform.runs import LANES, TILE, tile_count
+from weathercoat.deform.runs import TILE, tile_count
 from weathercoat.mesh.halfedge import HalfEdgeMesh
 from weathercoat.mesh.surface import Indices, Vectors
 
 
 class Planes(NamedTuple):
-    """The vertices that may move, with their planes n . p = offset, packed in lanes as constraints are.
+    """The vertices that may move, with their planes n . p = offset, tile by tile, each packed without gaps.
 
-    first_block: int32 (t + 1,), the blocks of each tile; filled (t,), lanes in use; lane (3 m,), where a film
-    vertex is packed, or -1; vertex int32 (b, 16); plane (b, 4, 16), normal and offset.
+    first: int32 (t + 1,), where the room of each tile begins; filled (t,), how much of it is in use; place
+    (3 m,), where a film vertex is, or -1; vertex int32 (3 m,); plane (3 m, 4), normal and offset.
     """
 
-    first_block: Indices
+    first: Indices
     filled: Indices
-    lane: Indices
+    place: Indices
     vertex: Indices
     plane: Vectors
 
@@ -29,52 +29,48 @@ class Planes(NamedTuple):
 def make_planes(mesh: HalfEdgeMesh) -> Planes:
     """No vertex that may move, and room for as many copies of each as it has faces."""
     corners = np.bincount(mesh.tail // TILE, minlength=tile_count(len(mesh.rest_positions)))
-    first_block = np.concatenate([[0], np.cumsum(-(-corners // LANES))]).astype(np.int32)
-    blocks = int(first_block[-1])
     return Planes(
-        first_block=first_block,
+        first=np.concatenate([[0], np.cumsum(corners)]).astype(np.int32),
         filled=np.zeros(len(corners), np.int32),
-        lane=np.full(len(mesh.tail), -1, np.int32),
-        vertex=np.zeros((blocks, LANES), np.int32),
-        plane=np.zeros((blocks, 4, LANES)),
+        place=np.full(len(mesh.tail), -1, np.int32),
+        vertex=np.zeros(len(mesh.tail), np.int32),
+        plane=np.zeros((len(mesh.tail), 4)),
     )
 
 
 @kernel
 def let_move(mesh: HalfEdgeMesh, planes: Planes, v: int) -> None:
     """Hold film vertex v above its plane from now on."""
-    if planes.lane[v] >= 0:
+    if planes.place[v] >= 0:
         return
     o = mesh.origin[v]
     tile = o // TILE
-    lane = LANES * planes.first_block[tile] + planes.filled[tile]
+    place = planes.first[tile] + planes.filled[tile]
     planes.filled[tile] += 1
-    planes.lane[v] = lane
-    b, i = lane // LANES, lane % LANES
-    planes.vertex[b, i] = v
+    planes.place[v] = place
+    planes.vertex[place] = v
     offset = 0.0
     for axis in range(3):
-        planes.plane[b, axis, i] = mesh.rest_normals[o, axis]
+        planes.plane[place, axis] = mesh.rest_normals[o, axis]
         offset += mesh.rest_normals[o, axis] * mesh.rest_positions[o, axis]
-    planes.plane[b, 3, i] = offset
+    planes.plane[place, 3] = offset
 
 
 @kernel
 def forget(mesh: HalfEdgeMesh, planes: Planes, v: int) -> None:
-    """Let film vertex v be, which is gone or rests: the last one of its tile takes its lane."""
-    lane = planes.lane[v]
-    if lane < 0:
+    """Let film vertex v be, which is gone or at rest: the last one of its tile takes its place."""
+    place = planes.place[v]
+    if place < 0:
         return
     tile = mesh.origin[v] // TILE
     planes.filled[tile] -= 1
-    last = LANES * planes.first_block[tile] + planes.filled[tile]
-    b, i, c, j = lane // LANES, lane % LANES, last // LANES, last % LANES
-    moved = planes.vertex[c, j]
-    planes.vertex[b, i] = moved
+    last = planes.first[tile] + planes.filled[tile]
+    moved = planes.vertex[last]
+    planes.vertex[place] = moved
     for k in range(4):
-        planes.plane[b, k, i] = planes.plane[c, k, j]
-    planes.lane[moved] = lane
-    planes.lane[v] = -1
+        planes.plane[place, k] = planes.plane[last, k]
+    planes.place[moved] = place
+    planes.place[v] = -1
 
 
 @formula

@@ -120,23 +120,14 @@ def _sweep_other_angles(
 def sweep_substrate(positions: Vectors, planes: Planes, first_tile: int, last_tile: int) -> None:
     """Put vertices of the tiles back on their planes where they are below; changes positions."""
     vertex, plane = planes.vertex, planes.plane
-    p = np.empty((3, LANES))
     for tile in range(first_tile, last_tile):
-        left = planes.filled[tile]
-        b = planes.first_block[tile]
-        while left > 0:
-            for i in range(LANES):
-                for axis in range(3):
-                    p[axis, i] = positions[vertex[b, i], axis]
-            for i in range(LANES):
-                p[0, i], p[1, i], p[2, i] = stay_above(
-                    p[0, i], p[1, i], p[2, i], plane[b, 0, i], plane[b, 1, i], plane[b, 2, i], plane[b, 3, i]
-                )
-            for i in range(min(left, LANES)):
-                for axis in range(3):
-                    positions[vertex[b, i], axis] = p[axis, i]
-            left -= LANES
-            b += 1
+        first = planes.first[tile]
+        for i in range(first, first + planes.filled[tile]):
+            v = vertex[i]
+            positions[v, 0], positions[v, 1], positions[v, 2] = stay_above(
+                positions[v, 0], positions[v, 1], positions[v, 2],
+                plane[i, 0], plane[i, 1], plane[i, 2], plane[i, 3],
+            )  # fmt: skip
 
 
 @kernel

@@ -11,6 +11,8 @@ import numpy as np
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
 from weathercoat.deform.deformation import DeformParameters, Residual, deform, measure_residual
 from weathercoat.film.agenda import Agenda, make_agenda
+from weathercoat.deform.sleep import Rest, make_rest
+from weathercoat.deform.team import Team
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import separate
@@ -40,8 +42,9 @@ _UP = np.array([0.0, 0.0, 1.0])  # in the simulation's frame
 class Simulation:
     """The state of a run. All lengths inside are in sizes, in the frame of the shape.
 
-    `surface` is the input in the order that the simulation uses; `flake_areas` lists the rest areas, in
-    square sizes, of all flakes that fell; `seconds` sums the time by stage, in the rows of the paper's table.
+    `surface` is the input in the order that the simulation uses; `team` are the threads that share a step;
+    `flake_areas` lists the rest areas, in square sizes, of all flakes that fell; `seconds` sums the time by
+    stage, in the rows of the paper's table.
     """
 
     surface: Surface
@@ -62,12 +65,15 @@ class Simulation:
     seconds: dict[str, float] = field(
         default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0}
     )
+    team: Team = field(default_factory=Team)
     log: EventLog = field(init=False)
+    rest: Rest = field(init=False)
     runoff: Runoff = field(init=False)
     agenda: Agenda = field(init=False)
 
     def __post_init__(self) -> None:
         self.log = make_event_log(len(self.mesh.faces))
+        self.rest = make_rest(len(self.mesh.twin))
         self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
         self.agenda = make_agenda(self.mesh, self.film, make_film_rules(self.film_parameters))
 
@@ -98,7 +104,7 @@ class Simulation:
         follow_events(self.mesh, self.constraints, self.log)
         decided = time.perf_counter()
 
-        deform(self.mesh, self.constraints, self.deform_parameters, age)
+        deform(self.mesh, self.constraints, self.deform_parameters, age, team=self.team, rest=self.rest)
         deformed = time.perf_counter()
 
         rust_room.follow_events(self.mesh, self.rust, self.log, age)
@@ -165,12 +171,13 @@ def make_simulation(
     seed: int = 1,
     frame: Frame | None = None,
     lay_out: Callable[[HalfEdgeMesh, FilmParameters, int], FilmLayout] = lay_out_film,
+    threads: int = 1,
 ) -> Simulation:
     """A simulation of a manifold, oriented surface, at age 0; `duration` is the age that `steps` steps cover.
 
     `frame` is that of the surface itself unless given; give the input's, where the surface is a remeshed one,
     so that noise lies alike at every resolution. `lay_out` gives the film its adhesion and cohesion from the
-    mesh, the parameters and the seed.
+    mesh, the parameters and the seed. `threads` share the work of a step; their number changes no result.
     """
     frame = frame or make_frame(surface)
     ordered, _ = order_surface(surface, frame.localise(surface.vertices))
@@ -190,4 +197,5 @@ def make_simulation(
         palette=palette or Palette(),
         steps=steps,
         duration=duration,
+        team=Team(threads),
     )
