@@ -105,7 +105,7 @@ WITHOUT_PICTURE: dict[str, str] = {
     "appearance.metal": "a colour",
     "appearance.rust": "a colour",
     "appearance.dust": "a colour",
-    "deformation.sleep_tolerance": "saves time where film has come to rest; see [performance](performance.md)",
+    "deformation.sleep_tolerance": "saves time where film is at rest; see [performance](performance.md)",
     "snapshots.count": "when, not what, is recorded",
     "snapshots.steps": "when, not what, is recorded",
     "output.formats": "which files are written",

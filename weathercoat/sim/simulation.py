@@ -10,9 +10,9 @@ import numpy as np
 
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
 from weathercoat.deform.deformation import DeformParameters, Residual, deform, measure_residual
-from weathercoat.film.agenda import Agenda, make_agenda
 from weathercoat.deform.sleep import Rest, make_rest
 from weathercoat.deform.team import Team
+from weathercoat.film.agenda import Agenda, make_agenda
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import separate
