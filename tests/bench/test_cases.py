@@ -25,12 +25,17 @@ def test_short_runs_are_timed_whole_and_long_ones_by_samples() -> None:
 
 
 def test_cases_are_the_meshes_then_the_plates_with_the_peer_where_it_is_due() -> None:
-    cases = make_cases([("bunny", 10_000)], [3_000, 10_000], 1000)
-    assert [(case.label, case.with_peer) for case in cases] == [
-        ("bunny", False),
-        ("plate 3,000", False),
-        ("plate 10,000", True),
+    cases = make_cases([("bunny", 10_000)], [3_000, 10_000, 100_000], 1000, threads=3)
+    assert [(case.label, case.with_peer, case.variant_of) for case in cases] == [
+        ("bunny", False, ""),
+        ("plate 3,000", False, ""),
+        ("plate 10,000", True, ""),
+        ("plate 10,000, asleep at rest", False, "plate 10,000"),
+        ("plate 100,000", True, ""),
+        ("plate 100,000, 3 threads", False, "plate 100,000"),
     ]
+    assert cases[-1].threads == 3 and cases[-1].sample == cases[-2].sample
+    assert not any(case.threads > 1 for case in make_cases([], [100_000], 1000, threads=1))
 
 
 @pytest.mark.parametrize(

@@ -131,6 +131,7 @@ def test_without_matplotlib_there_is_a_note_and_no_chart(
         (["--faces", "none"], 2, "nothing to measure"),
         (["--steps", "3"], 2, "at least 10 steps"),
         (["--repeats", "0"], 2, "at least 1"),
+        (["--threads", "0"], 2, "at least 1"),
         (["missing.obj"], 3, "missing.obj"),
         (["-o", "no/where"], 7, "no folder"),
     ],

@@ -18,7 +18,7 @@ from typing import Any
 from weathercoat.bench.cases import Case
 from weathercoat.errors import CheckError
 
-_THREADS = 1
+_THREADS = "1"  # of libraries: our own threads are asked for by the case
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -45,8 +45,8 @@ def measure_apart(
 def _ask(job: dict[str, Any], label: str, progress: Callable[[int], None]) -> dict[str, Any]:
     """Have a job done in a new process."""
     path = os.pathsep.join(filter(None, [str(_PACKAGE.parent), os.environ.get("PYTHONPATH")]))
-    threads = str(_THREADS)
-    environment = {**os.environ, "PYTHONPATH": path, "NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+    threads = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"), _THREADS)
+    environment = {**os.environ, "PYTHONPATH": path, **threads}
     with subprocess.Popen(
         [sys.executable, "-m", __spec__.name],
         stdin=subprocess.PIPE,

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 STAGES = ("failure", "deformation", "mesh", "stains", "other")  # the rows of the paper's table
 FACES = (3_000, 10_000, 100_000, 300_000, 1_000_000)
 PEER_FACES = (10_000, 100_000)  # plates on which the peer is timed too
+THREADED_FACES = (100_000,)  # plates that are run on several threads too
+SLEEPING_FACES = (10_000,)  # plates that are run with film at rest asleep too
+SLEEP_TOLERANCE = 1e-5  # sizes a step on 10,000 faces: a 1,500th of an edge
 _MOST_WORK = 30_000_000  # faces times steps of a run that is timed whole
 _SAMPLED_WORK = 2_000_000  # faces times timed steps in each tenth of a longer one
 _FEWEST_SAMPLED = 5
@@ -54,18 +58,33 @@ class Case:
     steps: int
     sample: int = 0
     with_peer: bool = False
+    threads: int = 1
     overrides: tuple[str, ...] = ()
     variant_of: str = ""
 
 
-def make_cases(meshes: Sequence[tuple[str, int]], plates: Sequence[int], steps: int) -> list[Case]:
-    """The cases for meshes, given as (name, number of faces), and for generated plates of so many faces."""
-    of_meshes = [Case(name, faces, steps, sample_size(faces, steps)) for name, faces in meshes]
-    of_plates = [
-        Case(f"plate {faces:,}", faces, steps, sample_size(faces, steps), with_peer=faces in PEER_FACES)
-        for faces in plates
-    ]
-    return of_meshes + of_plates
+def make_cases(
+    meshes: Sequence[tuple[str, int]], plates: Sequence[int], steps: int, threads: int
+) -> list[Case]:
+    """The cases for meshes, given as (name, number of faces), and for generated plates of so many faces, each
+    followed by its variants.
+
+    threads: of the variant on several, where more than 1.
+    """
+    cases = [Case(name, faces, steps, sample_size(faces, steps)) for name, faces in meshes]
+    for faces in plates:
+        plate = Case(f"plate {faces:,}", faces, steps, sample_size(faces, steps))
+        cases.append(replace(plate, with_peer=faces in PEER_FACES))
+        if faces in THREADED_FACES and threads > 1:
+            cases.append(_vary(plate, f"{threads} threads", threads=threads))
+        if faces in SLEEPING_FACES:
+            asleep = f"deformation.sleep_tolerance={SLEEP_TOLERANCE!r}"
+            cases.append(_vary(plate, "asleep at rest", overrides=(asleep,)))
+    return cases
+
+
+def _vary(case: Case, how: str, **changes: Any) -> Case:
+    return replace(case, label=f"{case.label}, {how}", variant_of=case.label, **changes)
 
 
 def sample_size(faces: int, steps: int) -> int:

@@ -62,7 +62,7 @@ def measure_case(
     setups = []
     for number in range(repeats):
         started = time.perf_counter()
-        simulation = make_speed_simulation(surface, config)
+        simulation = make_speed_simulation(surface, config, case.threads)
         setups.append(time.perf_counter() - started)
         snapshots = len(config.snapshots.due(case.steps))
         runs.append(drive(simulation, case.sample, snapshots, _count_from(number * case.steps, progress)))
@@ -81,6 +81,7 @@ def measure_case(
         "vertices": len(surface.vertices),
         "steps": case.steps,
         "timed_steps": sum(tenth.timed for tenth in runs[-1]),
+        "threads": case.threads,
         "overrides": list(case.overrides),
         "variant_of": case.variant_of,
         "repeats": repeats,
@@ -143,7 +144,7 @@ def _time_deform(simulation: Simulation, sweeps: int) -> float:
     mesh = simulation.mesh._replace(positions=simulation.mesh.positions.copy())
     parameters = replace(simulation.deform_parameters, deformation_sweeps=sweeps)
     started = time.perf_counter()
-    deform(mesh, simulation.constraints, parameters, simulation.age)
+    deform(mesh, simulation.constraints, parameters, simulation.age, team=simulation.team)
     return time.perf_counter() - started
 
 

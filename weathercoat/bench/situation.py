@@ -41,8 +41,8 @@ def load_speed_config(steps: int = 1000, overrides: Sequence[str] = ()) -> Confi
     return load_config(CONFIG, [Override("ageing.steps", steps, "--steps"), *overrides]).config
 
 
-def make_speed_simulation(surface: Surface, config: Config) -> Simulation:
-    """A simulation of the benchmark's situation on a manifold, oriented surface.
+def make_speed_simulation(surface: Surface, config: Config, threads: int = 1) -> Simulation:
+    """A simulation of the benchmark's situation on a manifold, oriented surface, for so many threads.
 
     Raises ValueError where it is no such surface.
     """
@@ -55,15 +55,21 @@ def make_speed_simulation(surface: Surface, config: Config) -> Simulation:
         fracture_speed=film.fracture_speed * scale,
     )
     deform = fill(DeformParameters, config)
+    deform = replace(
+        deform,
+        curl_radius=deform.curl_radius * scale,
+        deformation_sleep_tolerance=deform.deformation_sleep_tolerance * scale,
+    )
     return make_simulation(
         surface,
         film=film,
-        deform=replace(deform, curl_radius=deform.curl_radius * scale),
+        deform=deform,
         stain=fill(StainParameters, config),
         steps=config.ageing.steps,
         duration=config.ageing.duration,
         seed=config.seed,
         lay_out=lay_out_load,
+        threads=threads,
     )
 
 

@@ -34,18 +34,20 @@ def bench_speed(
     *,
     steps: int = 1000,
     repeats: int = 3,
+    threads: int = 2,
     progress: Callable[[int, int], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Any]:
     """The results for meshes as they are and for generated plates of so many faces, as plain values.
 
-    steps: of a run; all times are given for 1,000 of them. progress: called with the steps done, of all cases
-    and repeats, and their number. say: called with what is worth knowing, a line each. Errors: those of
-    reading; UsageError for too few faces, steps or repeats; CheckError where a case cannot be measured.
+    steps: of a run; all times are given for 1,000 of them. threads: of the variants on several. progress:
+    called with the steps done, of all cases and repeats, and their number. say: called with what is worth
+    knowing, a line each. Errors: those of reading; UsageError for too few faces, steps, repeats or threads;
+    CheckError where a case cannot be measured.
     """
-    _check(meshes, plates, steps, repeats)
+    _check(meshes, plates, steps, repeats, threads)
     surfaces = [(path.stem, _read(path)) for path in meshes]
-    cases = make_cases([(name, len(surface.faces)) for name, surface in surfaces], plates, steps)
+    cases = make_cases([(name, len(surface.faces)) for name, surface in surfaces], plates, steps, threads)
     ready = dict(surfaces)
     if peer_version() is None:
         say("pypbd is not installed (`pip install 'weathercoat[bench]'`), so no peer is timed")
@@ -68,9 +70,7 @@ def bench_speed(
                 say(f"{case.label}: not the benchmark's situation: {deviation}")
             share = figures["cpu_seconds"] / figures["seconds"]["total"]
             if share < _LEAST_CPU_SHARE:
-                say(
-                    f"{case.label}: the machine was busy: {share:.0%} of the time was this process's own"
-                )
+                say(f"{case.label}: the machine was busy: {share:.0%} of the time was this process's own")
             apart = compare_ends(end, ends_of[case.variant_of]) if case.variant_of else None
             found.append({**_completed(figures, machine), "apart": apart})
             meshes_of[case.label], ends_of[case.label] = mesh, end
@@ -94,7 +94,7 @@ def _read(path: Path) -> Surface:
     return surface
 
 
-def _check(meshes: Sequence[Path], plates: Sequence[int], steps: int, repeats: int) -> None:
+def _check(meshes: Sequence[Path], plates: Sequence[int], steps: int, repeats: int, threads: int) -> None:
     if not meshes and not plates:
         raise UsageError(
             "there is nothing to measure", remedy="give meshes, or numbers of faces with --faces"
@@ -106,6 +106,8 @@ def _check(meshes: Sequence[Path], plates: Sequence[int], steps: int, repeats: i
         raise UsageError(f"--steps: a run has at least {FEWEST_STEPS} steps, not {steps}")
     if repeats < 1:
         raise UsageError(f"--repeats: at least 1, not {repeats}")
+    if threads < 1:
+        raise UsageError(f"--threads: at least 1, not {threads}")
     names = [path.stem for path in meshes]
     if len(set(names)) < len(names):
         raise UsageError("two meshes have the same name", remedy="rename one")
@@ -121,7 +123,8 @@ def _save(surface: Surface, path: Path) -> None:
 
 def _completed(figures: dict[str, Any], machine: dict[str, Any]) -> dict[str, Any]:
     """The figures of a case with the paper's beside them, and with what the machine allows at most."""
-    paper = find_paper_timing(figures["label"], figures["faces"])
+    is_variant = bool(figures["variant_of"])
+    paper = None if is_variant else find_paper_timing(figures["label"], figures["faces"])
     sweep = figures["sweep"]
     floor = floor_ms(sweep["flops"], sweep["bytes"], machine["arithmetic_peak"], machine["copy_bandwidth"])
     return {

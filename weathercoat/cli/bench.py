@@ -26,6 +26,14 @@ def command() -> None:
 )
 @click.option("--steps", type=int, default=1000, show_default=True, metavar="N", help="Steps of a run.")
 @click.option("--repeats", type=int, default=3, show_default=True, metavar="N", help="Runs of each case.")
+@click.option(
+    "--threads",
+    type=int,
+    default=2,
+    show_default=True,
+    metavar="N",
+    help="Threads of the variant that runs on several; 1 for none.",
+)
 @options.output("Folder for speed.json, speed.csv and speed.png; without it nothing is written.")
 @options.overwrite
 @options.quiet
@@ -36,6 +44,7 @@ def speed(
     faces: str | None,
     steps: int,
     repeats: int,
+    threads: int,
     output: Path | None,
     overwrite: bool,
     quiet: bool,
@@ -44,7 +53,8 @@ def speed(
     """Time 1,000 steps on each MESH as it is, and on generated plates, stage by stage.
 
     The situation is fixed: 60 % of the vertices separate and 2,000 edges break on 10,000 faces, both evenly.
-    Each case runs in a process of its own, on one core. Of long runs a few steps are timed in each tenth.
+    Each case runs in a process of its own, on one core but for the variant on several threads. Of long runs
+    a few steps are timed in each tenth.
     """
     from weathercoat.bench.cases import FACES
     from weathercoat.bench.files import RESULTS, write_results
@@ -56,7 +66,13 @@ def speed(
     folder = None if output is None else RunFolder(output, overwrite=overwrite, marker=RESULTS)
     with Messages(quiet=quiet or as_json) as messages:
         results = bench_speed(
-            meshes, plates, steps=steps, repeats=repeats, progress=messages.progress, say=messages.log
+            meshes,
+            plates,
+            steps=steps,
+            repeats=repeats,
+            threads=threads,
+            progress=messages.progress,
+            say=messages.log,
         )
         if folder is not None:
             with folder as path:
