@@ -22,7 +22,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import NamedTemporaryFile, mkdtemp
@@ -190,12 +190,28 @@ def watch_compiling(begun: Callable[[], None]) -> Iterator[Compiling]:
         yield compiling
 
 
+def _template_of_wide(template_of: Callable[..., Any], args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+    """Type a call of one kernel by another as if every signed integer had 64 bits.
+
+    Otherwise an index that is an element of an int32 array, a loop's counter and a number in the source each
+    make their caller compile a variant of its own.
+    """
+    wide = tuple(
+        numba.int64
+        if isinstance(arg, numba.types.Integer | numba.types.IntegerLiteral) and arg.signed
+        else arg
+        for arg in args
+    )
+    return template_of(wide, kws)
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors.
 
     It runs without the interpreter's lock, so that threads can share work.
     """
-    compiled = numba.njit(fastmath=False, error_model="numpy", nogil=True)(function)
+    compiled = numba.njit(fastmath=False, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    compiled.get_call_template = partial(_template_of_wide, compiled.get_call_template)  # type: ignore[attr-defined]
     package, _, module = function.__module__.partition(".")
     if package == __name__.partition(".")[0]:
         compiled._cache = _KernelCache(function, module)  # type: ignore[attr-defined]
