@@ -196,13 +196,9 @@ def _template_of_wide(template_of: Callable[..., Any], args: tuple[Any, ...], kw
     Otherwise an index that is an element of an int32 array, a loop's counter and a number in the source each
     make their caller compile a variant of its own.
     """
-    wide = tuple(
-        numba.int64
-        if isinstance(arg, numba.types.Integer | numba.types.IntegerLiteral) and arg.signed
-        else arg
-        for arg in args
-    )
-    return template_of(wide, kws)
+    integer, int64 = numba.types.Integer, numba.types.int64
+    wide = (int64 if isinstance(arg, integer) and arg.signed else arg for arg in args)  # type: ignore[attr-defined]
+    return template_of(tuple(wide), kws)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -210,11 +206,13 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     It runs without the interpreter's lock, so that threads can share work.
     """
-    compiled = numba.njit(fastmath=False, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
-    compiled.get_call_template = partial(_template_of_wide, compiled.get_call_template)  # type: ignore[attr-defined]
+    compiled = numba.njit(  # type: ignore[call-overload]
+        fastmath=False, error_model="numpy", nogil=True, no_cfunc_wrapper=True
+    )(function)
+    compiled.get_call_template = partial(_template_of_wide, compiled.get_call_template)
     package, _, module = function.__module__.partition(".")
     if package == __name__.partition(".")[0]:
-        compiled._cache = _KernelCache(function, module)  # type: ignore[attr-defined]
+        compiled._cache = _KernelCache(function, module)
     return compiled  # type: ignore[no-any-return]
 
 

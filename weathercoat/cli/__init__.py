@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from typing import NoReturn
 
@@ -11,6 +12,9 @@ from weathercoat.cli.signals import Stopped, raise_signals
 def main() -> NoReturn:
     """The entry point: run the command line of this process and exit."""
     raise_signals()
+    # Modules and compiled functions stay to the end. To look through them for garbage again and again, and
+    # once more at exit, would take a fifth of the time of a short run.
+    gc.set_threshold(100_000, 50, 100)
     try:
         from weathercoat.cli.handler import run
 
@@ -18,4 +22,5 @@ def main() -> NoReturn:
     except Stopped as stopped:
         print(f"weathercoat: {stopped.word}", file=sys.stderr)
         code = stopped.exit_code
+    gc.freeze()
     sys.exit(code)
