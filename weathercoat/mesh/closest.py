@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.buckets import order_codes
@@ -55,6 +56,22 @@ def find_closest(tree: ClosestTree, points: Vectors, hint: Indices) -> tuple[Ind
     face, near = np.empty(len(points), np.int32), np.empty((len(points), 3))
     _search(tree.corner, tree.face, tree.place, tree.box, points, hint, face, near)
     return face, near
+
+
+def are_within(tree: ClosestTree, points: Vectors, faces: Indices, distance: float) -> NDArray[np.bool_]:
+    """Whether each of the points (k, 3) is within `distance` of its own one of the `faces` (k,)."""
+    near = np.empty(len(points), np.bool_)
+    _compare(tree.corner, tree.place, points, faces, distance, near)
+    return near
+
+
+@kernel
+def _compare(
+    corner: Vectors, place: Indices, points: Vectors, faces: Indices, distance: float, near: NDArray[np.bool_]
+) -> None:
+    for i in range(len(points)):
+        squared = _closest_at(corner, place[faces[i]], points[i, 0], points[i, 1], points[i, 2])[0]
+        near[i] = squared <= distance * distance
 
 
 @kernel

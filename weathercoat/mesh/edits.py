@@ -437,19 +437,21 @@ def _mark_edges_about(v: int, mesh: EditableMesh, is_due: NDArray[np.bool_]) -> 
 
 @kernel
 def mark_edges_about_new(first: int, mesh: EditableMesh, is_due: NDArray[np.bool_]) -> None:
-    """Mark the edges whose flip the vertices from `first` on, which splits have added, may have changed."""
-    tail, twin, start = mesh.tail, mesh.twin, mesh.half_edge
-    for v in range(first, mesh.count[0]):
-        _mark_edges_about(v, mesh, is_due)
-        h = start[v]
-        while True:
-            _mark_edges_about(tail[next_of(h)], mesh, is_due)
-            q = prev_of(h)
-            h = twin[q]
-            if h < 0:
-                _mark_edges_about(tail[q], mesh, is_due)
-            if h < 0 or h == start[v]:
-                break
+    """Mark the edges whose flip the vertices from `first` on, which splits have added, may have changed.
+
+    No face of the mesh may be gone.
+    """
+    tail, twin = mesh.tail, mesh.twin
+    is_near = np.zeros(mesh.count[0], np.bool_)
+    for h in range(3 * mesh.count[1]):
+        a, b = tail[h], tail[next_of(h)]
+        if a >= first or b >= first:
+            is_near[a] = True
+            is_near[b] = True
+    for h in range(0, 3 * mesh.count[1], 3):
+        if is_near[tail[h]] or is_near[tail[h + 1]] or is_near[tail[h + 2]]:
+            for k in range(h, h + 3):
+                is_due[k if twin[k] < 0 else min(k, twin[k])] = True
 
 
 def flip_edges(

@@ -117,6 +117,9 @@ def flip_nearer(mesh: EditableMesh, source: InputSurface, tolerance: float) -> i
     g = mesh.twin[h]
     p, tail = mesh.position, mesh.tail
     middle = 0.5 * (p[tail[h]] + p[tail[g]])
+    # Few edges are far from the input: most are near the face that they are known to be above.
+    doubtful = ~source.are_within(middle, mesh.source[h // 3], tolerance)
+    h, g, middle = h[doubtful], g[doubtful], middle[doubtful]
     before = np.linalg.norm(source.closest(middle, mesh.source[h // 3])[1] - middle, axis=1)
     far = before > tolerance
     h, g, before = h[far], g[far], before[far]

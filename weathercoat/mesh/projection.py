@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
-from weathercoat.mesh.closest import closest_on_triangle, find_closest, make_closest_tree
+from weathercoat.mesh.closest import are_within, closest_on_triangle, find_closest, make_closest_tree
 from weathercoat.mesh.surface import Indices, Vectors, face_normals
 from weathercoat.mesh.topology import number_components
 
@@ -30,6 +31,10 @@ class InputSurface:
     def closest(self, points: Vectors, hint: Indices) -> tuple[Indices, Vectors]:
         """The nearest face (k,) and point on it (k, 3) for points (k, 3); faces `hint` (k,) nearby."""
         return find_closest(self._tree, points, hint)
+
+    def are_within(self, points: Vectors, faces: Indices, distance: float) -> NDArray[np.bool_]:
+        """Whether each of the points (k, 3) is within `distance` of its own one of the `faces` (k,)."""
+        return are_within(self._tree, points, faces, distance)
 
     def project(self, points: Vectors, normal: Vectors, hint: Indices) -> tuple[Indices, Vectors]:
         """Like `closest`, for points with the normals (k, 3) that belong near the faces `hint` (k,).
