@@ -81,7 +81,7 @@ def _match_places(points, part, first):  # type: ignore[no-untyped-def]
     for i in range(n):
         for k in range(3):
             bits[k] = points[i, k] + 0.0  # -0.0 is at the place of 0.0
-        slot = _slot(part[i], pattern[0], pattern[1], pattern[2], size)
+        slot = np.int64(_hash(part[i], pattern[0], pattern[1], pattern[2]) & np.uint64(size - 1))
         first[i] = i
         while table[slot] >= 0:
             j = table[slot]
@@ -103,7 +103,8 @@ def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-unt
     """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each, or itself.
 
     Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell
-    holds more than a few.
+    holds more than a few. One bit for each of many more hashes, few enough to stay in the cache, tells of most
+    cells that they are empty.
     """
     n = len(points)
     size = 16
@@ -111,13 +112,20 @@ def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-unt
         size *= 2
     head = np.full(size, -1, np.int32)
     behind = np.full(n, -1, np.int32)
+    in_table, in_word = np.uint64(size - 1), np.uint64(63)
+    in_bits = np.uint64(8 * size - 1)
+    taken = np.zeros(8 * size // 64, np.uint64)
     for i in range(n):
         x, y, z = lattice[i]
         first[i] = i
         for a in range((x - 2) >> 2, ((x + 2) >> 2) + 1):
             for b in range((y - 2) >> 2, ((y + 2) >> 2) + 1):
                 for c in range((z - 2) >> 2, ((z + 2) >> 2) + 1):
-                    j = head[_slot(part[i], a, b, c, size)]
+                    key = _hash(part[i], a, b, c)
+                    bit = key & in_bits
+                    if not (taken[bit >> np.uint64(6)] >> (bit & in_word)) & np.uint64(1):
+                        continue
+                    j = head[key & in_table]
                     while j >= 0:
                         near = part[j] == part[i]
                         for k in range(3):
@@ -126,17 +134,18 @@ def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-unt
                             first[i] = j
                         j = behind[j]
         if first[i] == i:
-            slot = _slot(part[i], x >> 2, y >> 2, z >> 2, size)
-            behind[i] = head[slot]
-            head[slot] = i
+            key = _hash(part[i], x >> 2, y >> 2, z >> 2)
+            bit = key & in_bits
+            taken[bit >> np.uint64(6)] |= np.uint64(1) << (bit & in_word)
+            behind[i] = head[key & in_table]
+            head[key & in_table] = i
 
 
 @kernel
-def _slot(part, a, b, c, size):  # type: ignore[no-untyped-def]
-    """A place in a hash table of `size` (a power of two) for a cell of a grid in a part."""
+def _hash(part, a, b, c):  # type: ignore[no-untyped-def]
+    """A number of 64 bits, the lower 32 well mixed, for a cell of a grid in a part."""
     key = np.uint64(part) * np.uint64(0xD6E8FEB86659FD93)
     key = (key ^ (key >> np.uint64(29))) + np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(29))) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> np.uint64(29))) + np.uint64(c) * np.uint64(0x94D049BB133111EB)
-    key ^= key >> np.uint64(32)
-    return np.int64(key & np.uint64(size - 1))
+    return key ^ (key >> np.uint64(32))
