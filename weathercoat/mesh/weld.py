@@ -103,8 +103,8 @@ def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-unt
     """`first` (n,) becomes the first kept point within the box `tolerance` (n, 3) of each, or itself.
 
     Cells of four steps of the `lattice` in a hash table; only kept points are entered, so that no cell
-    holds more than a few. One bit for each of many more hashes, few enough to stay in the cache, tells of most
-    cells that they are empty.
+    holds more than a few. One bit for each of many more hashes, few enough to stay in the cache, tells of
+    most cells that they are empty.
     """
     n = len(points)
     size = 16
