@@ -22,7 +22,7 @@ import numpy as np
 
 from weathercoat.compile import formula, kernel
 from weathercoat.mesh.dihedral import bend_gradient
-from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.mesh.surface import Vectors
 
 DIHEDRAL, SPLIT, ARCCOS = 0, 1, 2
 FORMS = {"dihedral": DIHEDRAL, "split": SPLIT, "arccos": ARCCOS}
@@ -213,29 +213,3 @@ def meet_arccos_angle(
         positions[p2, axis] -= w2 * scale * gradient[1, axis]
         positions[p3, axis] -= w3 * scale * gradient[2, axis]
         positions[p4, axis] -= w4 * scale * gradient[3, axis]
-
-
-@kernel
-def meet_angle(
-    form: int, positions: Vectors, hinge: Indices, w1: float, w2: float, w3: float, w4: float,
-    target: float, stiffness: float, gradient: Vectors,
-) -> None:  # fmt: skip
-    """Bring one hinge, int (4,), towards its target by a form; changes positions. gradient: scratch."""
-    p1, p2, p3, p4 = hinge[0], hinge[1], hinge[2], hinge[3]
-    if form == SPLIT:
-        meet_split_angle(positions, p1, p2, p3, p4, w1, w2, w3, w4, target, stiffness)
-    elif form == ARCCOS:
-        meet_arccos_angle(positions, p1, p2, p3, p4, w1, w2, w3, w4, target, stiffness, gradient)
-    else:
-        moved = meet_dihedral(
-            positions[p1, 0], positions[p1, 1], positions[p1, 2],
-            positions[p2, 0], positions[p2, 1], positions[p2, 2],
-            positions[p3, 0], positions[p3, 1], positions[p3, 2],
-            positions[p4, 0], positions[p4, 1], positions[p4, 2],
-            w1, w2, w3, w4, target, stiffness,
-        )  # fmt: skip
-        for axis in range(3):
-            positions[p1, axis] = moved[axis]
-            positions[p2, axis] = moved[3 + axis]
-            positions[p3, axis] = moved[6 + axis]
-            positions[p4, axis] = moved[9 + axis]

@@ -12,7 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from weathercoat.compile import kernel
-from weathercoat.deform.angle import DIHEDRAL, FORMS, meet_angle
+from weathercoat.deform.angle import (
+    DIHEDRAL,
+    FORMS,
+    SPLIT,
+    meet_arccos_angle,
+    meet_dihedral,
+    meet_split_angle,
+)
 from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.deformation import DeformParameters
 from weathercoat.deform.length import meet_length
@@ -129,9 +136,8 @@ def project_lengths(positions: Vectors, inverse_mass: Vectors, ends: Indices, re
             positions[b, 0], positions[b, 1], positions[b, 2],
             inverse_mass[a], inverse_mass[b], rest_length[i],
         )  # fmt: skip
-        for axis in range(3):
-            positions[a, axis] = moved[axis]
-            positions[b, axis] = moved[3 + axis]
+        positions[a, 0], positions[a, 1], positions[a, 2] = moved[0], moved[1], moved[2]
+        positions[b, 0], positions[b, 1], positions[b, 2] = moved[3], moved[4], moved[5]
 
 
 @kernel
@@ -141,8 +147,24 @@ def project_angles(
     """Bring each of the hinges (k, 4) towards its target (k,) by a form, in order; changes positions."""
     gradient = np.empty((4, 3))
     for i in range(len(hinges)):
-        w = inverse_mass[hinges[i]]
-        meet_angle(form, positions, hinges[i], w[0], w[1], w[2], w[3], target[i], stiffness, gradient)
+        p1, p2, p3, p4 = hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3]
+        w1, w2, w3, w4 = inverse_mass[p1], inverse_mass[p2], inverse_mass[p3], inverse_mass[p4]
+        if form == DIHEDRAL:
+            moved = meet_dihedral(
+                positions[p1, 0], positions[p1, 1], positions[p1, 2],
+                positions[p2, 0], positions[p2, 1], positions[p2, 2],
+                positions[p3, 0], positions[p3, 1], positions[p3, 2],
+                positions[p4, 0], positions[p4, 1], positions[p4, 2],
+                w1, w2, w3, w4, target[i], stiffness,
+            )  # fmt: skip
+            positions[p1, 0], positions[p1, 1], positions[p1, 2] = moved[0], moved[1], moved[2]
+            positions[p2, 0], positions[p2, 1], positions[p2, 2] = moved[3], moved[4], moved[5]
+            positions[p3, 0], positions[p3, 1], positions[p3, 2] = moved[6], moved[7], moved[8]
+            positions[p4, 0], positions[p4, 1], positions[p4, 2] = moved[9], moved[10], moved[11]
+        elif form == SPLIT:
+            meet_split_angle(positions, p1, p2, p3, p4, w1, w2, w3, w4, target[i], stiffness)
+        else:
+            meet_arccos_angle(positions, p1, p2, p3, p4, w1, w2, w3, w4, target[i], stiffness, gradient)
 
 
 @kernel

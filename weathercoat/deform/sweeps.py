@@ -9,7 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from weathercoat.compile import kernel
-from weathercoat.deform.angle import DIHEDRAL, meet_angle, meet_dihedral
+from weathercoat.deform.angle import (
+    DIHEDRAL,
+    SPLIT,
+    meet_arccos_angle,
+    meet_dihedral,
+    meet_split_angle,
+)
 from weathercoat.deform.length import meet_length
 from weathercoat.deform.runs import LANES, Runs
 from weathercoat.deform.substrate import Planes, stay_above
@@ -101,19 +107,18 @@ def _sweep_other_angles(
 ) -> None:
     """The forms that are kept for comparison, one hinge after another."""
     gradient = np.empty((4, 3))
-    hinge = np.empty(4, np.int32)
     for run in range(angles.tile_run[first_tile], angles.tile_run[last_tile]):
-        lane = LANES * angles.first_block[run]
-        for _ in range(angles.filled[run]):
+        first = LANES * angles.first_block[run]
+        for lane in range(first, first + angles.filled[run]):
             b, i = lane // LANES, lane % LANES
-            for k in range(4):
-                hinge[k] = angles.vertices[b, k, i]
-            w = angles.moves[b]
-            meet_angle(
-                form, positions, hinge, 1.0 * w[0, i], 1.0 * w[1, i], 1.0 * w[2, i], 1.0 * w[3, i],
-                angles.target[b, i], stiffness, gradient,
-            )  # fmt: skip
-            lane += 1
+            p, w, target = angles.vertices[b, :, i], angles.moves[b, :, i], angles.target[b, i]
+            w1, w2, w3, w4 = 1.0 * w[0], 1.0 * w[1], 1.0 * w[2], 1.0 * w[3]
+            if form == SPLIT:
+                meet_split_angle(positions, p[0], p[1], p[2], p[3], w1, w2, w3, w4, target, stiffness)
+            else:
+                meet_arccos_angle(
+                    positions, p[0], p[1], p[2], p[3], w1, w2, w3, w4, target, stiffness, gradient
+                )
 
 
 @kernel
