@@ -9,6 +9,10 @@ import pytest
 
 from tests import zoo
 from tests.film.films import Film, make_film, sum_lift
+from weathercoat.film.agenda import FRINGE, SLACK
+from weathercoat.film.fringe import bound_lift, find_in_fringe
+from weathercoat.film.lift import sigmoid_bound
+from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.mesh.surface import Surface, Vectors
 
 
@@ -55,6 +59,40 @@ def test_sigmoid_of_the_dihedral(bend: float, convexity: float) -> None:
     lift = lift_of(film, 0.7)
     assert lift[2] == pytest.approx(expected, rel=1e-13)
     assert lift[3] == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("convexity", [0.0, 0.3, 2.0, 100.0])
+def test_the_bound_is_above_the_sigmoid_and_close_to_it(convexity: float) -> None:
+    """Above it everywhere but for round-off, and for small bends by at most 0.02."""
+    for bend in np.concatenate([np.linspace(-np.pi, np.pi, 4001), np.geomspace(1e-300, 1e-3, 50)]):
+        for factor in (1e-6, 1.0, 1e6):
+            bound = sigmoid_bound(factor * np.sin(bend), factor * np.cos(bend), convexity)
+            exact = 1 / (1 + np.exp(-convexity * bend))
+            assert bound >= exact * (1 - 1e-12)
+            if abs(convexity * bend) < 1.0 and abs(bend) < 0.8:
+                assert bound <= exact + 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("sums", ["plain", "per_valence"])
+def test_the_bound_of_a_crumpled_film_is_above_its_lift(sums: str, seed: int) -> None:
+    """Every third vertex attached, the others anywhere: hinges bent by any angle, some vertices of eight and
+    more."""
+    random = np.random.default_rng(seed)
+    surface = make_random_sheet(faces=300, seed=seed + 1)
+    attached = tuple(range(0, len(surface.vertices), 3))
+    film = make_film(surface, attached=attached, lift_sum=sums)
+    free = film.state.separated[: film.mesh.vertex_count]
+    film.mesh.positions[: len(free)][free] += random.normal(scale=0.05, size=(free.sum(), 3))
+    agenda = film.agenda(1.0, 1.0)
+    find_in_fringe(film.mesh, film.state, film.rules, agenda, 1.0, 0)
+    lift = sum_lift(film)
+    assert agenda.counts[FRINGE] > 50
+    for i in range(agenda.counts[FRINGE]):
+        bound = bound_lift(
+            film.mesh.positions, agenda.hinges, agenda.sums, i, film.parameters.lift_convexity, -1.0
+        )
+        assert bound * (1 + SLACK) >= lift[agenda.fringe[i]]
 
 
 def test_ridges_lift_more_than_flats_and_these_more_than_valleys() -> None:

@@ -30,6 +30,7 @@ def find_in_fringe(
     separated, adhesion, rest_factor = state.separated, state.adhesion, state.lift_factor
     fringe, membership, hinges, sums = agenda.fringe, agenda.membership, agenda.hinges, agenda.sums
     scale = rules.lift_coefficient * (1.0 if rules.lifts_by_face else drying_tension(rules, age))
+    per_scale = 1.0 / (scale * (1.0 + SLACK))
     loss = rules.adhesion_loss_rate * age
     count = agenda.counts[FRINGE]
     i = 0
@@ -42,8 +43,8 @@ def find_in_fringe(
             sums[i, 2] = adhesion[v]
             membership[v] = PACKED
         if membership[v] == PACKED:
-            bound = bound_lift(positions, hinges, sums, i, rules.lift_convexity)
-            if scale * bound * (1.0 + SLACK) <= max(sums[i, 2] - loss, 0.0):
+            enough = max(sums[i, 2] - loss, 0.0) * per_scale
+            if bound_lift(positions, hinges, sums, i, rules.lift_convexity, enough) <= enough:
                 i += 1
                 continue
         if separated[v] or half_edge[v] < 0:
@@ -61,19 +62,21 @@ def find_in_fringe(
 
 
 @kernel
-def bound_lift(positions: Vectors, hinges: Indices, sums: Vectors, i: int, convexity: float) -> float:
+def bound_lift(
+    positions: Vectors, hinges: Indices, sums: Vectors, i: int, convexity: float, enough: float
+) -> float:
     """No less than `lift_on` a vertex by the drying tension, but for round-off, from what `pack_hinges` has
-    packed in row i.
+    packed in row i; no closer once it is not above `enough`.
     """
-    total = sums[i, 0]
+    most, factor = sums[i, 0], sums[i, 1]
     for k in range(PACKED_HINGES):
-        if hinges[i, k, 0] < 0:
+        if most * factor <= enough or hinges[i, k, 0] < 0:
             break
         sine, cosine = bend_direction(
             positions, hinges[i, k, 0], hinges[i, k, 1], hinges[i, k, 2], hinges[i, k, 3]
         )
-        total += sigmoid_bound(sine, cosine, convexity)
-    return total * sums[i, 1]
+        most -= 1.0 - sigmoid_bound(sine, cosine, convexity)
+    return most * factor
 
 
 @kernel
@@ -89,11 +92,11 @@ def pack_hinges(
     sums: Vectors,
 ) -> None:
     """Pack what `bound_lift` needs of an attached vertex in row i: the corners of the hinges opposite to it
-    that move, the sum of the sigmoids of the half-edges that do not, and the factor that makes it one of six.
+    that move, the sum of the sigmoids where those are 1, and the factor that makes it one of six half-edges.
 
     first: the half-edge at which the vertex's fan begins; rest_factor: (3 m,), the sigmoids at rest.
     """
-    still = 0.0
+    most = 0.0
     packed = 0
     count = 0
     leaving = first
@@ -102,23 +105,23 @@ def pack_hinges(
         g = twin[h]
         count += 1
         if g < 0:
-            still += 0.5
+            most += 0.5
         elif not (separated[tail[h]] or separated[tail[next_of(h)]] or separated[tail[prev_of(g)]]):
-            still += rest_factor[h]
-        elif packed == PACKED_HINGES:
-            still += 1.0
+            most += rest_factor[h]
         else:
-            hinges[i, packed, 0] = tail[h]
-            hinges[i, packed, 1] = tail[next_of(h)]
-            hinges[i, packed, 2] = tail[prev_of(h)]
-            hinges[i, packed, 3] = tail[prev_of(g)]
-            packed += 1
+            most += 1.0
+            if packed < PACKED_HINGES:
+                hinges[i, packed, 0] = tail[h]
+                hinges[i, packed, 1] = tail[next_of(h)]
+                hinges[i, packed, 2] = tail[prev_of(h)]
+                hinges[i, packed, 3] = tail[prev_of(g)]
+                packed += 1
         leaving = twin[prev_of(leaving)]
         if leaving == first:
             break
     if packed < PACKED_HINGES:
         hinges[i, packed, 0] = -1
-    sums[i, 0] = still
+    sums[i, 0] = most
     sums[i, 1] = 6.0 / count if per_valence and count > 0 else 1.0
 
 
