@@ -231,6 +231,7 @@ def test_nothing_is_left_to_compile_after_the_warm_up(tmp_path: Path) -> None:
     assert '"kernels": 0' in call("warmup", "--json")
     call("sample", "sign")
     call("sample", "gear")
+    (tmp_path / "quads.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 2 0\nv 0 1 0\nv 3 0 0\nf 1 2 3 4\nf 2 5 3\n")
     commands: list[list[object]] = [
         ["run", name, "sign.obj", "-o", name, *SMALL]
         for name in ("standard", "literal", "crackle", "curling", "rusting")
@@ -239,6 +240,7 @@ def test_nothing_is_left_to_compile_after_the_warm_up(tmp_path: Path) -> None:
         ["run", "standard", "gear.obj", "-o", "gear", *SMALL, "--set", "remesh=off"],
         ["remesh", "sign.obj", "-o", "remeshed.ply", "--faces", 3000],
         ["inspect", "remeshed.ply", "--self-intersections"],
+        ["inspect", "quads.obj"],
         ["render", "standard", "-o", "standard.png"],
     ]
     for arguments in commands:

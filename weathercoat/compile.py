@@ -169,11 +169,11 @@ class Compiling(numba.core.event.Listener):  # type: ignore[misc]
     def on_start(self, event: numba.core.event.Event) -> None:
         """Kernels are compiled within the kernels that call them; the outermost one's time counts."""
         if self._depth == 0:
-            self._started = time.perf_counter()
             if self.kernels == 0:
                 self.begun()
+            self._started = time.perf_counter()
         self._depth += 1
-        self.kernels += 1
+        self.kernels += not event.data["dispatcher"].py_func.__module__.startswith("numba.")
 
     def on_end(self, event: numba.core.event.Event) -> None:
         """The end of what began last."""

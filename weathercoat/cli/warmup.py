@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal, get_args, get_origin
@@ -11,6 +12,8 @@ from typing import Literal, get_args, get_origin
 import click
 
 from weathercoat.cli import options
+
+_CONCAVE_POLYGON = b"v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n"
 
 
 @click.command()
@@ -54,7 +57,7 @@ def _use_everything() -> None:
     """Age a small part by every form of every rule, remesh, inspect and draw."""
     from weathercoat.config.load import load_config
     from weathercoat.mesh.inspect import inspect_surface
-    from weathercoat.mesh.read import read_surface
+    from weathercoat.mesh.read import read_stream, read_surface
     from weathercoat.mesh.shapes import make_bracket
     from weathercoat.output.meshes import write_mesh
     from weathercoat.run import run_asset
@@ -62,8 +65,10 @@ def _use_everything() -> None:
     with TemporaryDirectory() as name:
         folder = Path(name)
         model = folder / "part.obj"
-        write_mesh(model, make_bracket(edge_length=0.2))
-        inspect_surface(read_surface(model), self_intersections=True)
+        for path in (folder / "part.off", folder / "part.ply", model):
+            write_mesh(path, make_bracket(edge_length=0.2))
+            inspect_surface(read_surface(path), self_intersections=True)
+        read_stream(BytesIO(_CONCAVE_POLYGON), format="obj")
         small = [
             "ageing.steps=20",
             "snapshots.count=1",
@@ -71,7 +76,8 @@ def _use_everything() -> None:
             "output.picture_height=48",
         ]
         for number, form in enumerate(_forms()):
-            remesh = f"remesh.faces={600}" if number == 0 else "remesh=off"
+            # so many that the turns of flat parts are balanced
+            remesh = "remesh.faces=4000" if number == 0 else "remesh=off"
             loaded = load_config("standard", [*small, remesh, *form])
             run_asset(loaded, model, folder / f"run_{number}")
 
