@@ -24,7 +24,7 @@ def corners_of(mesh: HalfEdgeMesh, runs: Runs) -> Indices:
     """The rest vertices of each slot, (s, k)."""
     h = runs.half_edge
     tail, head, apex = (np.roll(mesh.faces, -k, axis=1).reshape(-1) for k in range(3))
-    if runs.vertices.shape[1] == 2:
+    if runs.seats.shape[1] == 2:
         return np.stack([tail[h], head[h]], axis=1)
     return np.stack([tail[h], head[h], apex[h], apex[mesh.twin[h]]], axis=1)
 
@@ -109,7 +109,8 @@ def check_packing(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
         assert (runs.slot_at[lanes] == slots).all()
         assert np.bincount(runs.run[slots], minlength=len(runs.filled)).tolist() == runs.filled.tolist()
         assert (lanes - LANES * runs.first_block[runs.run[slots]] < runs.filled[runs.run[slots]]).all()
-        assert runs.vertices[lanes // LANES, :, lanes % LANES].tolist() == vertices.tolist()
+        seats = runs.seats[lanes // LANES, :, lanes % LANES]
+        assert constraints.seats.vertex[seats].tolist() == vertices.tolist()
         assert (runs.moves[lanes // LANES, :, lanes % LANES] == mass[vertices]).all()
     lengths, angles = constraints.lengths, constraints.angles
     lanes = lengths.lane[lengths.lane >= 0]
@@ -118,11 +119,15 @@ def check_packing(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
     h = active.hinge_edges
     data = np.stack([constraints.angle_start[h], constraints.angle_age[h], constraints.span[h]], axis=1)
     assert (angles.data[lanes // LANES, :, lanes % LANES] == data).all()
-    planes = constraints.planes
-    assert np.flatnonzero(planes.place >= 0).tolist() == active.free.tolist()
-    places = planes.place[active.free]
-    assert (planes.vertex[places] == active.free).all()
-    assert (planes.plane[places, :3] == mesh.rest_normals[mesh.origin[active.free]]).all()
+    seats = constraints.seats
+    taken = np.flatnonzero(seats.seat >= 0)
+    assert (seats.vertex[seats.seat[taken]] == taken).all()
+    tile = mesh.origin[taken] // TILE
+    assert np.bincount(tile, minlength=len(seats.filled)).tolist() == seats.filled.tolist()
+    assert (seats.seat[taken] - seats.first[tile] < seats.filled[tile]).all()
+    moving = taken[seats.plane[seats.seat[taken]].any(axis=1)]
+    assert moving.tolist() == active.free.tolist()
+    assert (seats.plane[seats.seat[moving], :3] == mesh.rest_normals[mesh.origin[moving]]).all()
 
 
 def step_beside(simulation: Simulation) -> None:

@@ -71,7 +71,7 @@ def test_a_break_wakes_the_ends_of_the_edge() -> None:
     for v in ends:
         assert not constraints.asleep[v]
         assert constraints.inverse_mass[v] == 1.0
-        assert constraints.planes.place[v] >= 0
+        assert constraints.seats.plane[constraints.seats.seat[v]].any()
 
 
 def test_what_is_packed_follows_sleepers_and_those_that_breaks_and_releases_wake() -> None:

@@ -45,23 +45,26 @@ def released(surface: Surface, vertices: list[int], age: float = 0.0) -> tuple[H
     return mesh, constraints
 
 
-def packed(runs: Runs) -> tuple[list[list[int]], list[int]]:
+def packed(constraints: Constraints, runs: Runs) -> tuple[list[list[int]], list[int]]:
     """The vertices and the half-edge of each active constraint, in the order of slots."""
+    vertex = constraints.seats.vertex
     lanes = [(lane, int(h)) for lane, h in zip(runs.lane, runs.half_edge, strict=True) if lane >= 0]
-    vertices = [runs.vertices[lane // LANES, :, lane % LANES].tolist() for lane, _ in lanes]
+    vertices = [vertex[runs.seats[lane // LANES, :, lane % LANES]].tolist() for lane, _ in lanes]
     return vertices, [h for _, h in lanes]
 
 
 def active_lengths(constraints: Constraints) -> list[tuple[int, ...]]:
-    return sorted(tuple(sorted(pair)) for pair in packed(constraints.lengths)[0])
+    return sorted(tuple(sorted(pair)) for pair in packed(constraints, constraints.lengths)[0])
 
 
 def active_hinges(mesh: HalfEdgeMesh, constraints: Constraints) -> set[tuple[int, int]]:
-    return zoo.edge_ends(mesh, np.array(packed(constraints.angles)[1], np.int32))
+    return zoo.edge_ends(mesh, np.array(packed(constraints, constraints.angles)[1], np.int32))
 
 
 def free_vertices(constraints: Constraints) -> list[int]:
-    return np.flatnonzero(constraints.planes.place >= 0).tolist()
+    seats = constraints.seats
+    moving = [v for v in np.flatnonzero(seats.seat >= 0) if seats.plane[seats.seat[v]].any()]
+    return [int(v) for v in moving]
 
 
 # --- what is active ---
@@ -69,7 +72,12 @@ def free_vertices(constraints: Constraints) -> list[int]:
 
 def test_an_attached_film_has_no_constraint() -> None:
     mesh, constraints = released(zoo.make_disc(), [])
-    assert packed(constraints.lengths)[0] == packed(constraints.angles)[0] == free_vertices(constraints) == []
+    assert (
+        packed(constraints, constraints.lengths)[0]
+        == packed(constraints, constraints.angles)[0]
+        == free_vertices(constraints)
+        == []
+    )
     before = mesh.positions.copy()
     deform(mesh, constraints, parameters(), 1.0)
     assert np.array_equal(mesh.positions, before, equal_nan=True)
@@ -85,7 +93,7 @@ def test_a_released_vertex_holds_its_edges_and_bends_the_opposite_ones() -> None
         (min(a, b), max(a, b)) for a, b in zip(ring, [*ring[1:], 1], strict=True)
     }
     assert free_vertices(constraints) == [0]
-    for p1, p2, p3, p4 in packed(constraints.angles)[0]:
+    for p1, p2, p3, p4 in packed(constraints, constraints.angles)[0]:
         assert {int(p3), int(p4)} >= {0}, "an apex is the released vertex"
         assert p1 != p2 and p4 not in (p1, p2, p3)
 
@@ -120,13 +128,13 @@ def test_a_broken_edge_loses_its_angle_and_has_two_lengths() -> None:
     """Paper 5.2: the length is doubled, one for each half-edge, and nothing refers across the crack."""
     surface = zoo.make_hexagon(2)
     mesh, constraints = released(surface, list(range(19)))
-    lengths, angles = len(active_lengths(constraints)), len(packed(constraints.angles)[0])
+    lengths, angles = len(active_lengths(constraints)), len(packed(constraints, constraints.angles)[0])
     log = make_event_log(len(surface.faces))
     for k in (1, 4):
         cut_edge(mesh, log, zoo.find_half_edge(mesh, 0, k))
     follow_events(mesh, constraints, log)
     assert len(active_lengths(constraints)) == lengths + 2
-    assert len(packed(constraints.angles)[0]) == angles - 2
+    assert len(packed(constraints, constraints.angles)[0]) == angles - 2
     (new,) = log.split_entries()[:, 0]
     assert constraints.inverse_mass[new] == 1.0 and new in free_vertices(constraints)
     sides = {
@@ -134,7 +142,7 @@ def test_a_broken_edge_loses_its_angle_and_has_two_lengths() -> None:
     }
     for v, other in ((0, new), (new, 0)):
         for runs in (constraints.lengths, constraints.angles):
-            rows = [vertices for vertices in packed(runs)[0] if v in vertices]
+            rows = [vertices for vertices in packed(constraints, runs)[0] if v in vertices]
             assert rows and not any(other in vertices for vertices in rows)
             if runs is constraints.lengths:
                 assert {end for ends in rows for end in ends} <= sides[v]
@@ -159,8 +167,8 @@ def test_every_live_edge_of_a_free_film_is_constrained_once() -> None:
         inner = int((mesh.twin >= 0).sum()) // 2
         assert len(active_lengths(constraints)) == inner + int((mesh.twin < 0).sum())
         assert len(set(active_lengths(constraints))) == len(active_lengths(constraints))
-        assert len(packed(constraints.angles)[0]) == inner
-        for hinge, h in zip(*packed(constraints.angles), strict=True):
+        assert len(packed(constraints, constraints.angles)[0]) == inner
+        for hinge, h in zip(*packed(constraints, constraints.angles), strict=True):
             g = mesh.twin[h]
             assert h < g
             expected = [mesh.tail[h], mesh.tail[next_of(h)], mesh.tail[prev_of(h)], mesh.tail[prev_of(g)]]
@@ -171,7 +179,7 @@ def test_every_live_edge_of_a_free_film_is_constrained_once() -> None:
 
 
 def targets_of(constraints: Constraints, p: DeformParameters, age: float) -> Vectors:
-    edges = np.array(packed(constraints.angles)[1], np.int32)
+    edges = np.array(packed(constraints, constraints.angles)[1], np.int32)
     return bends_wanted(constraints, edges, p, age)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.deform.runs import LANES, Runs, activate, deactivate, end_constraint, make_runs
-from weathercoat.deform.substrate import Planes, forget, let_move, make_planes
+from weathercoat.deform.seats import Seats, let_be, let_move, make_seats, take_seat
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
@@ -33,7 +33,7 @@ class Constraints(NamedTuple):
     asleep: NDArray[np.bool_]
     lengths: Runs
     angles: Runs
-    planes: Planes
+    seats: Seats
 
 
 def make_constraints(mesh: HalfEdgeMesh) -> Constraints:
@@ -63,7 +63,7 @@ def make_constraints(mesh: HalfEdgeMesh) -> Constraints:
         asleep=np.zeros(len(twin), np.bool_),
         lengths=make_runs(half_edges, np.stack([tail, head], axis=1), half_edges, rest_count, 0),
         angles=make_runs(hinges, corners, hinge_of, rest_count, 3),
-        planes=make_planes(mesh),
+        seats=make_seats(mesh),
     )
 
 
@@ -93,7 +93,7 @@ def _release(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices, ag
     angle_start = constraints.angle_start
     for v in vertices:
         constraints.inverse_mass[v] = 1.0
-        let_move(mesh, constraints.planes, v)
+        let_move(mesh, constraints.seats, v)
         first = mesh.half_edge[v]
         leaving = first
         while leaving >= 0:
@@ -112,7 +112,7 @@ def _release(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices, ag
 
 @kernel
 def _follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) -> None:
-    lengths, angles, planes = constraints.lengths, constraints.angles, constraints.planes
+    lengths, angles, seats = constraints.lengths, constraints.angles, constraints.seats
     touched = np.empty(4 * log.counts[1] + log.counts[0], np.int32)
     count = 0
     for i in range(log.counts[1]):
@@ -131,7 +131,7 @@ def _follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) 
             end_constraint(lengths, lengths.slot[h])
             if angles.slot[h] >= 0:
                 end_constraint(angles, angles.slot[h])
-            forget(mesh, planes, mesh.tail[h])
+            let_be(seats, mesh.tail[h])
     wake(mesh, constraints, touched)
     rouse(mesh, constraints, touched)
     refresh_round(mesh, constraints, touched)
@@ -144,7 +144,7 @@ def wake(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices) -> Non
         if mesh.half_edge[v] >= 0:
             constraints.asleep[v] = False
             constraints.inverse_mass[v] = 1.0
-            let_move(mesh, constraints.planes, v)
+            let_move(mesh, constraints.seats, v)
 
 
 @kernel
@@ -185,11 +185,13 @@ def refresh_round(mesh: HalfEdgeMesh, constraints: Constraints, centres: Indices
     start, since = constraints.angle_start, constraints.angle_age
     lengths, angles = constraints.lengths, constraints.angles
     l_slot, l_run, l_first, l_filled = lengths.slot, lengths.run, lengths.first_block, lengths.filled
-    l_lane, l_slot_at, l_vertices, l_moves = lengths.lane, lengths.slot_at, lengths.vertices, lengths.moves
+    l_lane, l_slot_at, l_seats, l_moves = lengths.lane, lengths.slot_at, lengths.seats, lengths.moves
     l_data, l_target = lengths.data, lengths.target
     a_slot, a_run, a_first, a_filled = angles.slot, angles.run, angles.first_block, angles.filled
-    a_lane, a_slot_at, a_vertices, a_moves = angles.lane, angles.slot_at, angles.vertices, angles.moves
+    a_lane, a_slot_at, a_seats, a_moves = angles.lane, angles.slot_at, angles.seats, angles.moves
     a_data, a_target = angles.data, angles.target
+    origin, seat, vertex = mesh.origin, constraints.seats.seat, constraints.seats.vertex
+    s_first, s_filled = constraints.seats.first, constraints.seats.filled
     corners = np.empty(4, np.int32)
     for v in centres:
         leaving = half_edge[v]
@@ -205,13 +207,15 @@ def refresh_round(mesh: HalfEdgeMesh, constraints: Constraints, centres: Indices
                 if mass[corners[0]] + mass[corners[1]] > 0.0:
                     lane = activate(l_slot[h], l_run, l_first, l_filled, l_lane, l_slot_at)
                     for k in range(2):
-                        l_vertices[lane // LANES, k, lane % LANES] = corners[k]
+                        l_seats[lane // LANES, k, lane % LANES] = take_seat(
+                            corners[k], origin, seat, vertex, s_first, s_filled
+                        )
                         l_moves[lane // LANES, k, lane % LANES] = mass[corners[k]] > 0.0
                     l_target[lane // LANES, lane % LANES] = rest_length[h]
                 else:
                     deactivate(
                         l_slot[h], l_run, l_first, l_filled, l_lane, l_slot_at,
-                        l_vertices, l_moves, l_data, l_target,
+                        l_seats, l_moves, l_data, l_target,
                     )  # fmt: skip
                 if g < 0 or math.isnan(start[h]):
                     continue
@@ -219,7 +223,9 @@ def refresh_round(mesh: HalfEdgeMesh, constraints: Constraints, centres: Indices
                 if mass[corners[0]] + mass[corners[1]] + mass[corners[2]] + mass[corners[3]] > 0.0:
                     lane = activate(a_slot[h], a_run, a_first, a_filled, a_lane, a_slot_at)
                     for k in range(4):
-                        a_vertices[lane // LANES, k, lane % LANES] = corners[k]
+                        a_seats[lane // LANES, k, lane % LANES] = take_seat(
+                            corners[k], origin, seat, vertex, s_first, s_filled
+                        )
                         a_moves[lane // LANES, k, lane % LANES] = mass[corners[k]] > 0.0
                     a_data[lane // LANES, 0, lane % LANES] = start[h]
                     a_data[lane // LANES, 1, lane % LANES] = since[h]
@@ -227,7 +233,7 @@ def refresh_round(mesh: HalfEdgeMesh, constraints: Constraints, centres: Indices
                 else:
                     deactivate(
                         a_slot[h], a_run, a_first, a_filled, a_lane, a_slot_at,
-                        a_vertices, a_moves, a_data, a_target,
+                        a_seats, a_moves, a_data, a_target,
                     )  # fmt: skip
             leaving = twin[arriving]
             if leaving == half_edge[v]:

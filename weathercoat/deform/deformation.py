@@ -12,6 +12,7 @@ from weathercoat.compile import kernel
 from weathercoat.deform.angle import DIHEDRAL, FORMS
 from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.runs import Runs
+from weathercoat.deform.seats import return_positions, seat_positions
 from weathercoat.deform.sleep import Rest, settle
 from weathercoat.deform.sweeps import aim, sweep, sweep_angles, sweep_lengths, sweep_substrate
 from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
@@ -64,7 +65,7 @@ def deform(
         _aim(c.angles, p, age, as_tangent=form == DIHEDRAL)
         sweep(
             p.deformation_sweeps, form, p.deformation_angle_stiffness,
-            mesh.positions, c.lengths, c.angles, c.planes,
+            mesh.positions, c.lengths, c.angles, c.seats,
         )  # fmt: skip
     if p.deformation_sleep_tolerance > 0.0 and rest is not None:
         settle(mesh, c, rest, p.deformation_sleep_tolerance)
@@ -77,33 +78,35 @@ def _deform_together(
 
     What a thread does to a tile, no other tile sees; constraints across tiles are met by one thread.
     """
-    p, lengths, angles, planes = parameters, constraints.lengths, constraints.angles, constraints.planes
+    p, lengths, angles, seats = parameters, constraints.lengths, constraints.angles, constraints.seats
     form, stiffness = FORMS[p.deformation_angle], p.deformation_angle_stiffness
     inside, length_tiles, angle_tiles = lengths.inside, len(lengths.tile_run) - 1, len(angles.tile_run) - 1
     cuts = _cut_evenly(angles, team.size)
 
     def begin(number: int) -> None:
         tiles = cuts[number], cuts[number + 1]
+        seat_positions(positions, seats, *tiles)
         _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=tiles)
-        sweep_lengths(positions, lengths, *tiles)
+        sweep_lengths(seats.positions, lengths, *tiles)
 
     def go_on(number: int) -> None:
         tiles = cuts[number], cuts[number + 1]
-        sweep_substrate(positions, planes, *tiles)
-        sweep_lengths(positions, lengths, *tiles)
+        sweep_substrate(seats, *tiles)
+        sweep_lengths(seats.positions, lengths, *tiles)
 
     def bend(number: int) -> None:
-        sweep_angles(form, positions, angles, stiffness, cuts[number], cuts[number + 1])
+        sweep_angles(form, seats.positions, angles, stiffness, cuts[number], cuts[number + 1])
 
     def end(number: int) -> None:
-        sweep_substrate(positions, planes, cuts[number], cuts[number + 1])
+        sweep_substrate(seats, cuts[number], cuts[number + 1])
+        return_positions(positions, seats, cuts[number], cuts[number + 1])
 
     _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=(inside, angle_tiles))
     for number in range(p.deformation_sweeps):
         team.share(begin if number == 0 else go_on)
-        sweep_lengths(positions, lengths, inside, length_tiles)
+        sweep_lengths(seats.positions, lengths, inside, length_tiles)
         team.share(bend)
-        sweep_angles(form, positions, angles, stiffness, inside, angle_tiles)
+        sweep_angles(form, seats.positions, angles, stiffness, inside, angle_tiles)
     if p.deformation_sweeps > 0:
         team.share(end)
 

@@ -23,7 +23,7 @@ from weathercoat.deform.angle import (
 from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.deformation import DeformParameters
 from weathercoat.deform.length import meet_length
-from weathercoat.deform.substrate import stay_above
+from weathercoat.deform.substrate import depth_below
 from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
@@ -176,7 +176,7 @@ def lift_to_substrate(
         o = origin[v]
         n, p = rest_normals[o], rest_positions[o]
         offset = n[0] * p[0] + n[1] * p[1] + n[2] * p[2]
-        x, y, z = stay_above(
-            positions[v, 0], positions[v, 1], positions[v, 2], n[0], n[1], n[2], offset
-        )  # fmt: skip
-        positions[v, 0], positions[v, 1], positions[v, 2] = x, y, z
+        depth = depth_below(positions[v, 0], positions[v, 1], positions[v, 2], n[0], n[1], n[2], offset)
+        if depth < 0.0:
+            for axis in range(3):
+                positions[v, axis] -= depth * n[axis]

@@ -38,8 +38,9 @@ class Runs(NamedTuple):
     Static: slot int32 (3 m,), the slot of a half-edge or -1; half_edge (s,), the half-edge of a slot; run
     (s,); first_block (r + 1,); tile_run (t + 1,), the first run of each tile. Of these, the tiles before
     `inside` share no vertex with each other. Changing: filled (r,), lanes in use; lane (s,), where a
-    slot is packed, or -1; slot_at (16 b,), its inverse; vertices int32 (b, k, 16); moves uint8 (b, k, 16),
-    whether the vertex has an inverse mass; data (b, d, 16), what the target is made from; target (b, 16).
+    slot is packed, or -1; slot_at (16 b,), its inverse; seats int32 (b, k, 16), of its vertices; moves uint8
+    (b, k, 16), whether the vertex has an inverse mass; data (b, d, 16), what the target is made from; target
+    (b, 16).
     """
 
     slot: Indices
@@ -51,7 +52,7 @@ class Runs(NamedTuple):
     filled: Indices
     lane: Indices
     slot_at: Indices
-    vertices: Indices
+    seats: Indices
     moves: NDArray[np.uint8]
     data: Vectors
     target: Vectors
@@ -97,7 +98,7 @@ def make_runs(
         lane=np.full(len(order), -1, np.int32),
         slot_at=np.full(LANES * blocks, -1, np.int32),
         # lanes behind the last active one are computed as well, and thrown away: they must be readable
-        vertices=np.zeros((blocks, corners, LANES), np.int32),
+        seats=np.zeros((blocks, corners, LANES), np.int32),
         moves=np.zeros((blocks, corners, LANES), np.uint8),
         data=np.zeros((blocks, data_rows, LANES)),
         target=np.zeros((blocks, LANES)),
@@ -178,7 +179,7 @@ def activate(
 @formula
 def deactivate(
     slot: int, run: Indices, first_block: Indices, filled: Indices, lane: Indices, slot_at: Indices,
-    vertices: Indices, moves: NDArray[np.uint8], data: Vectors, target: Vectors,
+    seats: Indices, moves: NDArray[np.uint8], data: Vectors, target: Vectors,
 ) -> None:  # fmt: skip
     """End a constraint, if it is active: the last one of its run takes its lane."""
     if lane[slot] >= 0:
@@ -186,8 +187,8 @@ def deactivate(
         filled[r] -= 1
         last = LANES * first_block[r] + filled[r]
         b, i, c, j = lane[slot] // LANES, lane[slot] % LANES, last // LANES, last % LANES
-        for k in range(vertices.shape[1]):
-            vertices[b, k, i] = vertices[c, k, j]
+        for k in range(seats.shape[1]):
+            seats[b, k, i] = seats[c, k, j]
             moves[b, k, i] = moves[c, k, j]
         for k in range(data.shape[1]):
             data[b, k, i] = data[c, k, j]
@@ -202,5 +203,5 @@ def end_constraint(runs: Runs, slot: int) -> None:
     """End a constraint, if it is active."""
     deactivate(
         slot, runs.run, runs.first_block, runs.filled, runs.lane, runs.slot_at,
-        runs.vertices, runs.moves, runs.data, runs.target,
+        runs.seats, runs.moves, runs.data, runs.target,
     )  # fmt: skip

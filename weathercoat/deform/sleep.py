@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.deform.constraints import Constraints, refresh_round, wake
 from weathercoat.deform.runs import LANES, Runs
-from weathercoat.deform.substrate import forget
+from weathercoat.deform.seats import let_be
 from weathercoat.mesh.halfedge import HalfEdgeMesh
 from weathercoat.mesh.surface import Indices, Vectors
 
@@ -63,8 +63,8 @@ def settle(mesh: HalfEdgeMesh, constraints: Constraints, rest: Rest, tolerance: 
         refresh_round(mesh, constraints, woken)
     note_moves(mesh.positions[:used], mass, _PERIOD * tolerance, rest.calm, rest.last)
     island = np.arange(used).astype(np.int32)
-    join_islands(constraints.lengths, island)
-    join_islands(constraints.angles, island)
+    join_islands(constraints.lengths, constraints.seats.vertex, island)
+    join_islands(constraints.angles, constraints.seats.vertex, island)
     least_calm = np.full(used, _CALM, np.uint8)
     for v in range(used):
         if mass[v] > 0.0:
@@ -79,7 +79,7 @@ def settle(mesh: HalfEdgeMesh, constraints: Constraints, rest: Rest, tolerance: 
     for v in falling[:count]:
         asleep[v] = True
         mass[v] = 0.0
-        forget(mesh, constraints.planes, v)
+        let_be(constraints.seats, v)
     refresh_round(mesh, constraints, falling[:count])
 
 
@@ -101,16 +101,19 @@ def note_moves(
 
 
 @kernel
-def join_islands(runs: Runs, island: Indices) -> None:
-    """Join the vertices that may move and that share an active constraint, in a union-find forest (k,)."""
+def join_islands(runs: Runs, vertex: Indices, island: Indices) -> None:
+    """Join the vertices that may move and that share an active constraint, in a union-find forest (k,).
+
+    vertex: who sits on a seat.
+    """
     for run in range(len(runs.filled)):
         first = LANES * runs.first_block[run]
         for lane in range(first, first + runs.filled[run]):
             b, i = lane // LANES, lane % LANES
             one = -1
-            for k in range(runs.vertices.shape[1]):
+            for k in range(runs.seats.shape[1]):
                 if runs.moves[b, k, i] > 0:
-                    root = find_root(island, runs.vertices[b, k, i])
+                    root = find_root(island, vertex[runs.seats[b, k, i]])
                     if one >= 0 and root != one:
                         # the smaller number is the root, whatever the order in which vertices are joined
                         island[max(one, root)] = min(one, root)

@@ -1,7 +1,8 @@
 """Gauss-Seidel sweeps over the constraints, 16 independent ones at a time (paper 4, 5).
 
 One sweep is all active lengths, then all active angles, then the substrate, each in the order of `runs`. The
-kernels take a range of tiles, so that one call or several threads can do the work, with the same bits.
+kernels take seated positions and a range of tiles, so that one call or several threads can do the work, with
+the same bits.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from weathercoat.deform.angle import (
 )
 from weathercoat.deform.length import meet_length
 from weathercoat.deform.runs import LANES, Runs
-from weathercoat.deform.substrate import Planes, stay_above
+from weathercoat.deform.seats import Seats, return_positions, seat_positions
+from weathercoat.deform.substrate import depth_below
 from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
 from weathercoat.mesh.surface import Vectors
 
@@ -26,10 +28,10 @@ from weathercoat.mesh.surface import Vectors
 @kernel
 def sweep_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile: int) -> None:
     """Meet the active lengths of tiles from `first_tile` to before `last_tile`; changes positions."""
-    first_block, filled, vertices, moves, target = (
+    first_block, filled, seats, moves, target = (
         lengths.first_block,
         lengths.filled,
-        lengths.vertices,
+        lengths.seats,
         lengths.moves,
         lengths.target,
     )
@@ -40,7 +42,7 @@ def sweep_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile:
         while left > 0:
             for k in range(2):
                 for i in range(LANES):
-                    v = vertices[b, k, i]
+                    v = seats[b, k, i]
                     for axis in range(3):
                         p[3 * k + axis, i] = positions[v, axis]
             for i in range(LANES):
@@ -50,7 +52,7 @@ def sweep_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile:
                 )  # fmt: skip
             for k in range(2):
                 for i in range(min(left, LANES)):
-                    v = vertices[b, k, i]
+                    v = seats[b, k, i]
                     for axis in range(3):
                         positions[v, axis] = p[3 * k + axis, i]
             left -= LANES
@@ -65,10 +67,10 @@ def sweep_angles(
     if form != DIHEDRAL:
         _sweep_other_angles(form, positions, angles, stiffness, first_tile, last_tile)
         return
-    first_block, filled, vertices, moves, target = (
+    first_block, filled, seats, moves, target = (
         angles.first_block,
         angles.filled,
-        angles.vertices,
+        angles.seats,
         angles.moves,
         angles.target,
     )
@@ -79,7 +81,7 @@ def sweep_angles(
         while left > 0:
             for k in range(4):
                 for i in range(LANES):
-                    v = vertices[b, k, i]
+                    v = seats[b, k, i]
                     for axis in range(3):
                         p[3 * k + axis, i] = positions[v, axis]
             for i in range(LANES):
@@ -94,7 +96,7 @@ def sweep_angles(
                 )  # fmt: skip
             for k in range(4):
                 for i in range(min(left, LANES)):
-                    v = vertices[b, k, i]
+                    v = seats[b, k, i]
                     for axis in range(3):
                         positions[v, axis] = p[3 * k + axis, i]
             left -= LANES
@@ -111,7 +113,7 @@ def _sweep_other_angles(
         first = LANES * angles.first_block[run]
         for lane in range(first, first + angles.filled[run]):
             b, i = lane // LANES, lane % LANES
-            p, w, target = angles.vertices[b, :, i], angles.moves[b, :, i], angles.target[b, i]
+            p, w, target = angles.seats[b, :, i], angles.moves[b, :, i], angles.target[b, i]
             w1, w2, w3, w4 = 1.0 * w[0], 1.0 * w[1], 1.0 * w[2], 1.0 * w[3]
             if form == SPLIT:
                 meet_split_angle(positions, p[0], p[1], p[2], p[3], w1, w2, w3, w4, target, stiffness)
@@ -122,17 +124,18 @@ def _sweep_other_angles(
 
 
 @kernel
-def sweep_substrate(positions: Vectors, planes: Planes, first_tile: int, last_tile: int) -> None:
-    """Put vertices of the tiles back on their planes where they are below; changes positions."""
-    vertex, plane = planes.vertex, planes.plane
+def sweep_substrate(seats: Seats, first_tile: int, last_tile: int) -> None:
+    """Put vertices of the tiles back on their planes where they are below; changes their positions."""
+    positions, plane = seats.positions, seats.plane
     for tile in range(first_tile, last_tile):
-        first = planes.first[tile]
-        for i in range(first, first + planes.filled[tile]):
-            v = vertex[i]
-            positions[v, 0], positions[v, 1], positions[v, 2] = stay_above(
-                positions[v, 0], positions[v, 1], positions[v, 2],
-                plane[i, 0], plane[i, 1], plane[i, 2], plane[i, 3],
-            )  # fmt: skip
+        first = seats.first[tile]
+        for s in range(first, first + seats.filled[tile]):
+            nx, ny, nz = plane[s, 0], plane[s, 1], plane[s, 2]
+            depth = depth_below(positions[s, 0], positions[s, 1], positions[s, 2], nx, ny, nz, plane[s, 3])
+            if depth < 0.0:
+                positions[s, 0] -= depth * nx
+                positions[s, 1] -= depth * ny
+                positions[s, 2] -= depth * nz
 
 
 @kernel
@@ -163,11 +166,13 @@ def aim(
 
 @kernel
 def sweep(
-    sweeps: int, form: int, stiffness: float, positions: Vectors, lengths: Runs, angles: Runs, planes: Planes
+    sweeps: int, form: int, stiffness: float, positions: Vectors, lengths: Runs, angles: Runs, seats: Seats
 ) -> None:
-    """A number of sweeps over all that is active; changes positions."""
-    length_tiles, angle_tiles = len(lengths.tile_run) - 1, len(angles.tile_run) - 1
+    """A number of sweeps over all that is active; changes positions (3 m, 3), of film vertices."""
+    tiles, length_tiles, angle_tiles = len(seats.filled), len(lengths.tile_run) - 1, len(angles.tile_run) - 1
+    seat_positions(positions, seats, 0, tiles)
     for _ in range(sweeps):
-        sweep_lengths(positions, lengths, 0, length_tiles)
-        sweep_angles(form, positions, angles, stiffness, 0, angle_tiles)
-        sweep_substrate(positions, planes, 0, len(planes.filled))
+        sweep_lengths(seats.positions, lengths, 0, length_tiles)
+        sweep_angles(form, seats.positions, angles, stiffness, 0, angle_tiles)
+        sweep_substrate(seats, 0, tiles)
+    return_positions(positions, seats, 0, tiles)
