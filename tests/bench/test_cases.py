@@ -15,7 +15,7 @@ from weathercoat.bench.cases import PAPER, find_paper_timing, make_cases, sample
 from weathercoat.bench.growth import fit_exponent
 from weathercoat.deform.angle import meet_dihedral
 from weathercoat.deform.length import meet_length
-from weathercoat.deform.substrate import stay_above
+from weathercoat.deform.substrate import depth_below
 
 
 def test_short_runs_are_timed_whole_and_long_ones_by_samples() -> None:
@@ -74,7 +74,7 @@ def test_the_exponent_of_a_power_law_is_found() -> None:
     [
         (meet_length, roofline.LENGTH_FLOPS),
         (meet_dihedral, roofline.ANGLE_FLOPS),
-        (stay_above, roofline.VERTEX_FLOPS),
+        (depth_below, roofline.VERTEX_FLOPS),
     ],
 )
 def test_operations_are_those_of_the_formulas(function: Callable[..., Any], counted: int) -> None:

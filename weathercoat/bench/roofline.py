@@ -7,12 +7,10 @@ came from memory once a sweep, read once and, where it changes, written once: an
 
 from __future__ import annotations
 
-LENGTH_FLOPS, ANGLE_FLOPS, VERTEX_FLOPS = 27, 174, 12
+LENGTH_FLOPS, ANGLE_FLOPS, VERTEX_FLOPS = 27, 174, 6
 LENGTH_BYTES = 2 * (4 + 1) + 8  # two indices, whether they move, and a target
 ANGLE_BYTES = 4 * (4 + 1) + 8  # four of them
-VERTEX_BYTES = (
-    3 * 2 * 24 + 4 + 32
-)  # read and written for lengths, angles, substrate; index and plane for that
+VERTEX_BYTES = 3 * 2 * 24 + 32  # read and written for lengths, angles, substrate; the plane for that
 
 
 def sweep_work(lengths: int, angles: int, vertices: int) -> dict[str, int]:
