@@ -61,9 +61,9 @@ class Changes(NamedTuple):
     """What the lists do not have yet.
 
     rank: int64 (n0,), 0 for the highest rest vertices, equal where level. Over film vertices: is_running,
-    those that are or will be in the order; is_stale, those of them whose list must be made anew. new: int64,
-    keys of vertices that start to run; stale: int32, vertices. counts: int64 (3,), how many of `new`, of
-    `stale` and of the order are in use.
+    those that are or will be in the order; is_stale, those of them whose list must be made anew, or goes with
+    the film that fell. new: int64, keys of vertices that start to run; stale: int32, vertices. counts: int64
+    (3,), how many of `new`, of `stale` and of the order are in use.
     """
 
     rank: Keys
@@ -124,10 +124,8 @@ def follow_events(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff, log: Even
     """Bring film rust and runoff up to date with a step's log: copies inherit, and a vertex of a new outline
     that lies lower than both its neighbours along it becomes a source.
     """
-    if log.counts[0] or log.counts[1]:
+    if log.counts[0] or log.counts[1] or log.counts[2]:
         _follow_events(mesh, rust.film, rust.source, runoff.height, log, runoff.changes)
-    if log.counts[2]:
-        _update_lists(mesh, rust, runoff)
 
 
 def run_off(mesh: HalfEdgeMesh, rust: RustState, runoff: Runoff, duration: float) -> None:
@@ -217,6 +215,9 @@ def _follow_events(
             _mark_stale(tail[next_of(h)], changes)
             _mark_stale(tail[prev_of(h)], changes)
             h = twin[prev_of(h)]
+    for i in range(log.counts[2]):
+        for h in range(3 * log.falls[i], 3 * log.falls[i] + 3):
+            _mark_stale(tail[h], changes)
 
 
 @kernel
@@ -281,8 +282,7 @@ def _merge(
             key = new[j]
             j += 1
         v = key & _VERTEX
-        fan = half_edge[v]
-        if fan < 0:
+        if is_stale[v] and half_edge[v] < 0:
             continue
         if merged == len(out_order):
             return False
@@ -309,6 +309,7 @@ def _merge(
         start = kept
         best = -1
         best_alignment = rates.alignment
+        fan = half_edge[v]
         leaving = fan
         while leaving >= 0:
             # the last half-edge of an open fan is only met as the one that arrives
