@@ -87,15 +87,15 @@ def _deform_together(
         tiles = cuts[number], cuts[number + 1]
         seat_positions(positions, seats, *tiles)
         _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=tiles)
-        sweep_lengths(seats.positions, lengths, *tiles)
+        sweep_lengths(seats, lengths, *tiles)
 
     def go_on(number: int) -> None:
         tiles = cuts[number], cuts[number + 1]
         sweep_substrate(seats, *tiles)
-        sweep_lengths(seats.positions, lengths, *tiles)
+        sweep_lengths(seats, lengths, *tiles)
 
     def bend(number: int) -> None:
-        sweep_angles(form, seats.positions, angles, stiffness, cuts[number], cuts[number + 1])
+        sweep_angles(form, seats, angles, stiffness, cuts[number], cuts[number + 1])
 
     def end(number: int) -> None:
         sweep_substrate(seats, cuts[number], cuts[number + 1])
@@ -104,9 +104,9 @@ def _deform_together(
     _aim(angles, p, age, as_tangent=form == DIHEDRAL, tiles=(inside, angle_tiles))
     for number in range(p.deformation_sweeps):
         team.share(begin if number == 0 else go_on)
-        sweep_lengths(seats.positions, lengths, inside, length_tiles)
+        sweep_lengths(seats, lengths, inside, length_tiles)
         team.share(bend)
-        sweep_angles(form, seats.positions, angles, stiffness, inside, angle_tiles)
+        sweep_angles(form, seats, angles, stiffness, inside, angle_tiles)
     if p.deformation_sweeps > 0:
         team.share(end)
 

@@ -24,9 +24,11 @@ from weathercoat.deform.substrate import depth_below
 from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
 from weathercoat.mesh.surface import Vectors
 
+_CACHED_TILES = 32  # so many stay in a second cache; of more, each comes from farther away
+
 
 @kernel
-def sweep_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile: int) -> None:
+def meet_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile: int) -> None:
     """Meet the active lengths of tiles from `first_tile` to before `last_tile`; changes positions."""
     first_block, filled, seats, moves, target = (
         lengths.first_block,
@@ -60,12 +62,12 @@ def sweep_lengths(positions: Vectors, lengths: Runs, first_tile: int, last_tile:
 
 
 @kernel
-def sweep_angles(
+def meet_angles(
     form: int, positions: Vectors, angles: Runs, stiffness: float, first_tile: int, last_tile: int
 ) -> None:
     """Bring the active hinges of tiles from `first_tile` to before `last_tile` towards their targets."""
     if form != DIHEDRAL:
-        _sweep_other_angles(form, positions, angles, stiffness, first_tile, last_tile)
+        _meet_other_angles(form, positions, angles, stiffness, first_tile, last_tile)
         return
     first_block, filled, seats, moves, target = (
         angles.first_block,
@@ -104,7 +106,7 @@ def sweep_angles(
 
 
 @kernel
-def _sweep_other_angles(
+def _meet_other_angles(
     form: int, positions: Vectors, angles: Runs, stiffness: float, first_tile: int, last_tile: int
 ) -> None:
     """The forms that are kept for comparison, one hinge after another."""
@@ -165,6 +167,48 @@ def aim(
 
 
 @kernel
+def read_ahead(seats: Seats, tile: int, heard: Vectors) -> None:
+    """Read the positions of a tile in their order, which the processor foresees, before they are wanted in
+    another.
+
+    The sum is of no use, but without one the compiler would leave the reading out. Groups of constraints
+    across tiles have no seats of their own.
+    """
+    if tile < len(seats.filled):
+        positions, first = seats.positions, seats.first[tile]
+        for s in range(first, first + seats.filled[tile], 2):
+            heard[0] += positions[s, 0]
+
+
+@kernel
+def sweep_lengths(seats: Seats, lengths: Runs, first_tile: int, last_tile: int) -> None:
+    """Meet the active lengths of tiles from `first_tile` to before `last_tile`; changes seated positions."""
+    if len(seats.filled) <= _CACHED_TILES:
+        meet_lengths(seats.positions, lengths, first_tile, last_tile)
+        return
+    heard = np.zeros(1)
+    for tile in range(first_tile, last_tile):
+        read_ahead(seats, tile, heard)
+        meet_lengths(seats.positions, lengths, tile, tile + 1)
+
+
+@kernel
+def sweep_angles(
+    form: int, seats: Seats, angles: Runs, stiffness: float, first_tile: int, last_tile: int
+) -> None:
+    """Bring the active hinges of tiles from `first_tile` to before `last_tile` towards their targets; changes
+    seated positions.
+    """
+    if len(seats.filled) <= _CACHED_TILES:
+        meet_angles(form, seats.positions, angles, stiffness, first_tile, last_tile)
+        return
+    heard = np.zeros(1)
+    for tile in range(first_tile, last_tile):
+        read_ahead(seats, tile, heard)
+        meet_angles(form, seats.positions, angles, stiffness, tile, tile + 1)
+
+
+@kernel
 def sweep(
     sweeps: int, form: int, stiffness: float, positions: Vectors, lengths: Runs, angles: Runs, seats: Seats
 ) -> None:
@@ -172,7 +216,7 @@ def sweep(
     tiles, length_tiles, angle_tiles = len(seats.filled), len(lengths.tile_run) - 1, len(angles.tile_run) - 1
     seat_positions(positions, seats, 0, tiles)
     for _ in range(sweeps):
-        sweep_lengths(seats.positions, lengths, 0, length_tiles)
-        sweep_angles(form, seats.positions, angles, stiffness, 0, angle_tiles)
+        sweep_lengths(seats, lengths, 0, length_tiles)
+        sweep_angles(form, seats, angles, stiffness, 0, angle_tiles)
         sweep_substrate(seats, 0, tiles)
     return_positions(positions, seats, 0, tiles)
