@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.sim.runs import make_run
-from weathercoat.deform.constraints import Constraints, make_constraints
+from tests.zoo import make_lattice
+from weathercoat.deform.constraints import Constraints, make_constraints, release
 from weathercoat.deform.deformation import DeformParameters, deform
 from weathercoat.deform.plain import deform_plainly, find_active
 from weathercoat.deform.runs import LANES, TILE, Runs, bucket
@@ -158,3 +159,23 @@ def test_packed_sweeps_are_the_plain_ones_bit_for_bit(seed: int, form: str) -> N
     for _ in range(25):
         step_beside(simulation)
     assert simulation.mesh.vertex_count > len(simulation.mesh.rest_positions), "nothing has split"
+
+
+def test_a_film_of_many_tiles_is_swept_as_plainly() -> None:
+    """More tiles than stay in a cache, whose positions are read ahead."""
+    from weathercoat.mesh.order import order_surface
+
+    surface = make_lattice(300, 150)
+    ordered, _ = order_surface(surface, surface.vertices)
+    mesh = make_half_edges(ordered.vertices, ordered.faces)
+    constraints = make_constraints(mesh)
+    assert len(constraints.seats.filled) > 32
+    free = np.flatnonzero(np.arange(len(ordered.vertices)) % 7 > 1).astype(np.int32)
+    release(mesh, constraints, free, 0.0)
+    parameters = DeformParameters(curl_radius=3.0, deformation_sweeps=2)
+    beside = mesh._replace(positions=mesh.positions.copy())
+    deform_plainly(beside, constraints, parameters, 0.5)
+    deform(mesh, constraints, parameters, 0.5)
+    used = mesh.vertex_count
+    assert mesh.positions[:used].tobytes() == beside.positions[:used].tobytes()
+    assert not np.array_equal(mesh.positions[:used], mesh.rest_positions)
