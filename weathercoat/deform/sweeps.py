@@ -167,17 +167,26 @@ def aim(
 
 
 @kernel
-def read_ahead(seats: Seats, tile: int, heard: Vectors) -> None:
-    """Read the positions of a tile in their order, which the processor foresees, before they are wanted in
-    another.
+def read_ahead(seats: Seats, runs: Runs, tile: int, heard: Vectors) -> None:
+    """Read what a tile is about to need, a cache line after the other, before it is wanted in another order
+    and one piece at a time.
 
     The sum is of no use, but without one the compiler would leave the reading out. Groups of constraints
     across tiles have no seats of their own.
     """
+    total = 0.0
     if tile < len(seats.filled):
-        positions, first = seats.positions, seats.first[tile]
-        for s in range(first, first + seats.filled[tile], 2):
-            heard[0] += positions[s, 0]
+        positions, first_seat = seats.positions, seats.first[tile]
+        for s in range(first_seat, first_seat + seats.filled[tile], 2):
+            total += positions[s, 0]
+    sitting, moves, target = runs.seats, runs.moves, runs.target
+    for run in range(runs.tile_run[tile], runs.tile_run[tile + 1]):
+        first = runs.first_block[run]
+        for b in range(first, first + (runs.filled[run] + LANES - 1) // LANES):
+            for k in range(sitting.shape[1]):
+                total += sitting[b, k, 0]
+            total += moves[b, 0, 0] + target[b, 0] + target[b, LANES // 2]
+    heard[0] += total
 
 
 @kernel
@@ -188,7 +197,7 @@ def sweep_lengths(seats: Seats, lengths: Runs, first_tile: int, last_tile: int) 
         return
     heard = np.zeros(1)
     for tile in range(first_tile, last_tile):
-        read_ahead(seats, tile, heard)
+        read_ahead(seats, lengths, tile, heard)
         meet_lengths(seats.positions, lengths, tile, tile + 1)
 
 
@@ -204,7 +213,7 @@ def sweep_angles(
         return
     heard = np.zeros(1)
     for tile in range(first_tile, last_tile):
-        read_ahead(seats, tile, heard)
+        read_ahead(seats, angles, tile, heard)
         meet_angles(form, seats.positions, angles, stiffness, tile, tile + 1)
 
 
