@@ -1,10 +1,10 @@
 """What a run will take: a linear model of measured rates, for `inspect`.
 
-The rates are CPU seconds of single-threaded runs of `standard` with compiled kernels, on one core of a busy
-two-core machine: a bunny remeshed to 3,000, 10,000 and 50,000 faces, with 10 and 30 sweeps, with 1 to 21
-snapshots, with pictures and without; a scan of 268,000 faces remeshed to 3,000. The model meets those runs
-within 20 %; another machine takes proportionally more or less. The first run after an installation compiles
-for about a minute more, which is left out. Memory is the largest resident set of the same runs.
+The rates are seconds of single-threaded runs of `standard` with compiled kernels, on one core of a two-core
+machine: a sign remeshed to 3,000, 10,000 and 30,000 faces, and a bunny of 10,000 without remeshing or pictures;
+of snapshots and pictures those of earlier runs, with 1 to 21 of them. The model meets those runs within 20 %;
+another machine takes proportionally more or less. The first run after an installation compiles for about a
+minute more, which is left out. Memory is the largest resident set of a run of 1,000,000 faces.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 from weathercoat.config.schema import Config
 
-SECONDS_AT_START = 1.5
+SECONDS_AT_START = 1.1
 SECONDS_PER_MODEL_FACE = 1e-5
-SECONDS_PER_REMESHED_FACE = 8e-5
-SECONDS_PER_FACE_AND_STEP = 2.4e-7
+SECONDS_PER_REMESHED_FACE = 6.5e-5
+SECONDS_PER_FACE_AND_STEP = 5e-8
 SECONDS_PER_FACE_AND_SWEEP = 1.2e-8
 SECONDS_PER_SNAPSHOT_FACE = 3.5e-6
 SECONDS_PER_PICTURE_PIXEL = 2.1e-6
 BYTES_AT_START = 200e6
 BYTES_PER_MODEL_FACE = 0.5e3
-BYTES_PER_FACE = 1.5e3
+BYTES_PER_FACE = 1.6e3
 BYTES_PER_PICTURE_PIXEL = 400
 
 
