@@ -1,10 +1,10 @@
 """What a run will take: a linear model of measured rates, for `inspect`.
 
 The rates are seconds of single-threaded runs of `standard` with compiled kernels, on one core of a two-core
-machine: a sign remeshed to 3,000, 10,000 and 30,000 faces, and a bunny of 10,000 without remeshing or pictures;
-of snapshots and pictures those of earlier runs, with 1 to 21 of them. The model meets those runs within 20 %;
-another machine takes proportionally more or less. The first run after an installation compiles for about a
-minute more, which is left out. Memory is the largest resident set of a run of 1,000,000 faces.
+machine: a sign remeshed to 3,000, 10,000 and 30,000 faces, and a bunny of 10,000 without remeshing or
+pictures; of snapshots and pictures those of earlier runs, with 1 to 21 of them. The model meets those runs
+within 20 %; another machine takes proportionally more or less. The first run after an installation compiles
+for about a minute more, which is left out. Memory is the largest resident set of a run of 1,000,000 faces.
 """
 
 from __future__ import annotations
