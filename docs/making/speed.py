@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
-from making.places import DOCS, IMAGES
-from weathercoat.bench.files import CHART, RESULTS, read_results
+from making.places import DOCS
+from making.results import fill_page, keep_results
+from weathercoat.bench.files import read_results
 from weathercoat.bench.tables import (
     as_markdown,
     load_table,
@@ -18,27 +18,23 @@ from weathercoat.bench.tables import (
 )
 
 PAGE = DOCS / "performance.md"
-_BEGIN, _END = "<!-- results: made by `make bench` -->\n", "<!-- end of results -->\n"
 
 
 def performance_page() -> str:
     """The page, with the tables of the results that are kept beside it."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(_BEGIN)
-    _, _, after = rest.partition(_END)
-    return before + _BEGIN + _results() + _END + after
+    return fill_page(PAGE, "make bench", _results())
 
 
 def take_results(folder: Path) -> None:
     """Keep the results of `weathercoat bench speed -o FOLDER`, and write the page."""
-    shutil.copy(folder / RESULTS, DOCS / RESULTS)
-    shutil.copy(folder / CHART, IMAGES / CHART)
+    keep_results(folder, "speed")
     PAGE.write_text(performance_page(), encoding="utf-8")
     print(PAGE.name, flush=True)
 
 
 def _results() -> str:
     """All tables and the chart."""
-    results = read_results(DOCS)
+    results = read_results(DOCS, "speed")
     machine, versions, *abilities = machine_lines(results)
     paper = f"{results['paper_machine']}; its sweeps are not given"
     tables = {
@@ -54,6 +50,6 @@ def _results() -> str:
         if len(table) > 1:
             parts += [f"**{title}**", as_markdown(table)]
     parts.append(
-        f"![Seconds for 1,000 steps over the number of faces, and speed over the age](images/{CHART})"
+        "![Seconds for 1,000 steps over the number of faces, and speed over the age](images/speed.png)"
     )
     return "\n" + "\n\n".join(parts) + "\n\n"

@@ -114,13 +114,14 @@ def test_files_are_written_whole(
 def test_without_matplotlib_there_is_a_note_and_no_chart(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, results: dict[str, Any]
 ) -> None:
+    from weathercoat.bench.chart import draw_chart
     from weathercoat.bench.files import read_results, write_results
 
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    missing = write_results(tmp_path, results)
+    missing = write_results(tmp_path, "speed", results, as_csv(results), {"speed": draw_chart})
     assert missing is not None and "matplotlib" in missing
     assert {path.name for path in tmp_path.iterdir()} == {"speed.json", "speed.csv"}
-    assert read_results(tmp_path) == results
+    assert read_results(tmp_path, "speed") == results
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
-from io import StringIO
 from typing import Any
 
 from weathercoat.bench.cases import STAGES
+from weathercoat.bench.files import rows_as_csv
 
 Table = list[list[str]]  # the first row is the heading
 
@@ -157,12 +156,7 @@ def as_markdown(table: Sequence[Sequence[str]]) -> str:
 
 def as_csv(results: dict[str, Any]) -> str:
     """The figures of each case on a line, all times in the unit that the column names."""
-    rows = [_csv_row(case) for case in results["cases"]]
-    out = StringIO()
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
+    return rows_as_csv([_csv_row(case) for case in results["cases"]])
 
 
 def _csv_row(case: dict[str, Any]) -> dict[str, Any]:

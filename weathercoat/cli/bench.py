@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,10 +13,14 @@ from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
 from weathercoat.errors import UsageError
 
+if TYPE_CHECKING:
+    from weathercoat.bench.files import Draw
+    from weathercoat.output.folder import RunFolder
+
 
 @click.group()
 def command() -> None:
-    """Measure how fast it is."""
+    """Measure how fast and how accurate it is."""
 
 
 @command.command("speed")
@@ -57,13 +63,12 @@ def speed(
     a few steps are timed in each tenth.
     """
     from weathercoat.bench.cases import FACES
-    from weathercoat.bench.files import RESULTS, write_results
+    from weathercoat.bench.chart import draw_chart
     from weathercoat.bench.speed import bench_speed
-    from weathercoat.bench.tables import as_text
-    from weathercoat.output.folder import RunFolder
+    from weathercoat.bench.tables import as_csv, as_text
 
     plates = FACES if faces is None else _parse_faces(faces)
-    folder = None if output is None else RunFolder(output, overwrite=overwrite, marker=RESULTS)
+    folder = _results_folder("speed", output, overwrite=overwrite)
     with Messages(quiet=quiet or as_json) as messages:
         results = bench_speed(
             meshes,
@@ -75,10 +80,43 @@ def speed(
             say=messages.log,
         )
         if folder is not None:
-            with folder as path:
-                missing = write_results(path, results)
-            if missing:
-                messages.log(missing)
+            _write(folder, "speed", results, as_csv(results), {"speed": draw_chart}, messages.log)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
+def _results_folder(name: str, output: Path | None, *, overwrite: bool) -> RunFolder | None:
+    """The folder for a benchmark's results, refused before any work where it cannot be written."""
+    from weathercoat.output.folder import RunFolder
+
+    return None if output is None else RunFolder(output, overwrite=overwrite, marker=f"{name}.json")
+
+
+def _write(
+    folder: RunFolder,
+    name: str,
+    results: dict[str, Any],
+    table: str,
+    charts: Mapping[str, Draw],
+    say: Callable[[str], None],
+) -> None:
+    """Fill the folder; says why there are no charts, if there are none."""
+    from weathercoat.bench.files import write_results
+
+    with folder as path:
+        missing = write_results(path, name, results, table, charts)
+    if missing:
+        say(missing)
+
+
+def _print(
+    results: dict[str, Any],
+    as_text: Callable[[dict[str, Any]], Iterable[str]],
+    output: Path | None,
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """The results as JSON, or as text for people, and where they were written."""
     if as_json:
         click.echo(json.dumps(results, indent=2, ensure_ascii=False))
     elif not quiet:
