@@ -1,0 +1,94 @@
+"""What descent and Newton share: the substrate's bounds, and a step length for each island."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.deform.energy import Elastic, energy
+from weathercoat.mesh.surface import Vectors
+
+_ON_PLANE = 1e-9  # film this close to the substrate lies on it [sizes]
+_ENOUGH = 1e-4  # least share of the decrease that the slope promises
+_SHORTER = 0.4
+_TRIALS = 14
+
+Flags = NDArray[np.bool_]
+
+
+class Solved(NamedTuple):
+    """How a solver ended: iterations, of the island that took most; gap, the largest estimate of how far an
+    island's energy is above its minimum, in units of its energy at rest; unfinished, the islands whose gap is
+    above the tolerance.
+    """
+
+    iterations: int
+    gap: float
+    unfinished: int
+
+
+def lift(elastic: Elastic, positions: Vectors) -> None:
+    """Put each free vertex below its plane back on it; changes positions (n, 3)."""
+    e = elastic
+    depth = _dot(e.normals, positions[e.free]) - e.offsets
+    below = depth < 0.0
+    positions[e.free[below]] -= depth[below, None] * e.normals[below]
+
+
+def resting(elastic: Elastic, positions: Vectors, slope: Vectors) -> Flags:
+    """The free vertices (v,) that lie on the substrate and are pressed against it by a gradient (v, 3)."""
+    e = elastic
+    on_plane = _dot(e.normals, positions[e.free]) - e.offsets <= _ON_PLANE
+    return on_plane & (_dot(e.normals, slope) > 0.0)
+
+
+def slide(elastic: Elastic, vectors: Vectors, held: Flags) -> Vectors:
+    """The vectors (v, 3) without the part along the normal, where a vertex is held on its plane."""
+    normals = elastic.normals[held]
+    out = vectors.copy()
+    out[held] -= _dot(normals, vectors[held])[:, None] * normals
+    return out
+
+
+def sum_islands(elastic: Elastic, a: Vectors, b: Vectors) -> Vectors:
+    """The scalar products of two fields (v, 3), for each island (k,)."""
+    return np.bincount(elastic.island, _dot(a, b), len(elastic.scale))
+
+
+def search(
+    elastic: Elastic, positions: Vectors, value: Vectors, slope: Vectors, direction: Vectors, live: Flags
+) -> tuple[Vectors, Vectors, Vectors]:
+    """Go along a direction (v, 3) as far as each live island's energy falls enough, over the substrate.
+
+    From energies (k,) and the gradient (v, 3). Returns the new positions, their energies, and the share of the
+    direction that each island went, 0 where none would do.
+    """
+    e = elastic
+    share = live.astype(np.float64)
+    searching = live
+    for _ in range(_TRIALS):
+        reached = _go(e, positions, direction, share)
+        new = energy(e, reached)
+        promised = sum_islands(e, slope, reached[e.free] - positions[e.free])
+        with np.errstate(invalid="ignore"):
+            searching = live & ~((new <= value + _ENOUGH * promised) & (promised < 0.0)) & (share > 0.0)
+        if not searching.any():
+            return reached, new, share
+        share = np.where(searching, _SHORTER * share, share)
+    share = np.where(searching, 0.0, share)
+    reached = _go(e, positions, direction, share)
+    return reached, energy(e, reached), share
+
+
+def _go(elastic: Elastic, positions: Vectors, direction: Vectors, share: Vectors) -> Vectors:
+    e = elastic
+    reached = positions.copy()
+    reached[e.free] += share[e.island][:, None] * direction
+    lift(e, reached)
+    return reached
+
+
+def _dot(a: Vectors, b: Vectors) -> Vectors:
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]

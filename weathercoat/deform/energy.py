@@ -1,0 +1,412 @@
+"""The energy that the converged solvers minimise: strain of the active edges, bend of the active hinges.
+
+    E = sum over edges  3 A_e / 2 (l / L - 1)^2
+      + sum over hinges 3 A_e / 2 (t^2 / 12) ((bend - target) / span)^2
+
+in units of the film's stretching stiffness (Young's modulus times thickness) times a size squared. A_e is a
+third of the rest area of the edge's faces, l its length and L its rest length, span the distance between the
+centres of its two faces at rest, so that the bend over the span is a curvature, and t the film's thickness.
+On equilateral triangles these sums are those of an isotropic plate whose Poisson's ratio is 1/3: stretching
+E t, bending E t^3 / 12, the ratio t^2 / 12 (docs/accuracy.md derives it). The substrate is an inequality:
+no free vertex lies below the plane of its origin.
+
+Source of the hinge's energy: Grinspun et al., Discrete shells, 2003.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from weathercoat.compile import formula, kernel
+from weathercoat.deform.islands import label_islands
+from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
+from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
+from weathercoat.mesh.surface import Indices, Vectors
+
+_NO_EXTENT = 1e-250  # squares of lengths and areas below this have no direction
+_LEAST_BEND, _LEAST_STRAIN = 1e-3, 1e-6  # what an island's energy is measured by where nothing curls it
+
+
+class Elastic(NamedTuple):
+    """The active edges and hinges of film that may move, with targets and weights; k islands.
+
+    free: int32 (v,), the vertices that may move, by island and ascending in it; unknown: int32 (n,), where each film vertex
+    stands in `free`, -1 if it is held. ends: int32 (l, 2), rest_length and length_weight (l,); hinges: int32
+    (a, 4) as drawn in `mesh.dihedral`, target [rad] and angle_weight (a,). normals (v, 3) and offsets (v,)
+    are the planes n . p = offset that free vertices stay above. island int32 (v,), length_island (l,),
+    angle_island (a,): which island of free film each belongs to; no element connects two. scale: (k,), the
+    energy of each island if it lay as at rest, by which all that is measured on it is divided.
+    """
+
+    free: Indices
+    unknown: Indices
+    ends: Indices
+    rest_length: Vectors
+    length_weight: Vectors
+    hinges: Indices
+    target: Vectors
+    angle_weight: Vectors
+    normals: Vectors
+    offsets: Vectors
+    island: Indices
+    length_island: Indices
+    angle_island: Indices
+    scale: Vectors
+
+
+class Aim(NamedTuple):
+    """How targets follow from an age: the fields of `DeformParameters` that kernels need."""
+
+    by_curvature: bool
+    radius: float
+    rate: float
+    floor: float
+    age: float
+
+
+def make_elastic(
+    mesh: HalfEdgeMesh,
+    is_free: Vectors,
+    rest_length: Vectors,
+    span: Vectors,
+    angle_start: Vectors,
+    angle_age: Vectors,
+    aim: Aim,
+    thickness: float,
+) -> Elastic:
+    """What acts on the film vertices with `is_free` (3 m,) > 0 and a face; arrays over half-edges as in
+    `Constraints`; thickness in sizes.
+    """
+    count = mesh.vertex_count
+    free = np.flatnonzero((is_free[:count] > 0.0) & (mesh.half_edge[:count] >= 0)).astype(np.int32)
+    unknown = _number(free, count)
+    lengths, angles = _count_active(mesh, unknown, rest_length, span, angle_start)
+    ends, hinges = np.empty((lengths, 2), np.int32), np.empty((angles, 4), np.int32)
+    length, length_weight = np.empty(lengths), np.empty(lengths)
+    target, angle_weight, scale_share = np.empty(angles), np.empty(angles), np.empty(angles)
+    _gather_active(
+        mesh, unknown, rest_length, span, angle_start, angle_age, aim, thickness * thickness / 12.0,
+        ends, length, length_weight, hinges, target, angle_weight, scale_share,
+    )  # fmt: skip
+    island, length_island, angle_island, islands = label_islands(unknown, len(free), ends, hinges)
+    order = np.argsort(island, kind="stable")
+    free, island = free[order], island[order]
+    origin = mesh.origin[free]
+    normals = mesh.rest_normals[origin]
+    return Elastic(
+        free=free,
+        unknown=_number(free, count),
+        ends=ends,
+        rest_length=length,
+        length_weight=length_weight,
+        hinges=hinges,
+        target=target,
+        angle_weight=angle_weight,
+        normals=normals,
+        offsets=np.einsum("ij,ij->i", normals, mesh.rest_positions[origin]),
+        island=island,
+        length_island=length_island,
+        angle_island=angle_island,
+        scale=np.bincount(angle_island, scale_share, islands)
+        + np.bincount(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
+    )
+
+
+def _number(free: Indices, count: int) -> Indices:
+    """Where each of `count` vertices stands in `free`, -1 where it does not."""
+    unknown = np.full(count, -1, np.int32)
+    unknown[free] = np.arange(len(free), dtype=np.int32)
+    return unknown
+
+
+def energy(elastic: Elastic, positions: Vectors) -> Vectors:
+    """The energy of each island, (k,), with film vertices at positions (n, 3)."""
+    e = elastic
+    out = np.zeros(len(e.scale))
+    _add_energy(
+        positions, e.ends, e.rest_length, e.length_weight, e.length_island,
+        e.hinges, e.target, e.angle_weight, e.angle_island, out,
+    )  # fmt: skip
+    return out
+
+
+def gradient(elastic: Elastic, positions: Vectors) -> Vectors:
+    """The gradient of the energy over the free vertices, (v, 3)."""
+    e = elastic
+    out = np.zeros((len(e.free), 3))
+    _add_gradient(
+        positions, e.unknown, e.ends, e.rest_length, e.length_weight, e.hinges, e.target, e.angle_weight, out
+    )
+    return out
+
+
+def hessian_product(elastic: Elastic, positions: Vectors, direction: Vectors) -> Vectors:
+    """The second derivative of the energy over the free vertices, times a direction (v, 3); (v, 3)."""
+    e = elastic
+    out = np.zeros((len(e.free), 3))
+    moving = np.zeros_like(positions)
+    moving[e.free] = direction
+    _add_hessian_product(
+        positions, moving, e.unknown, e.ends, e.rest_length, e.length_weight,
+        e.hinges, e.target, e.angle_weight, out,
+    )  # fmt: skip
+    return out
+
+
+@kernel
+def _count_active(
+    mesh: HalfEdgeMesh, unknown: Indices, rest_length: Vectors, span: Vectors, start: Vectors
+) -> tuple[int, int]:
+    """How many edges and hinges act on something free."""
+    tail, twin, alive = mesh.tail, mesh.twin, mesh.alive
+    lengths, angles = 0, 0
+    for h in range(len(twin)):
+        g = twin[h]
+        if not alive[h // 3] or 0 <= g < h:
+            continue
+        held = unknown[tail[h]] < 0 and unknown[tail[next_of(h)]] < 0
+        if not held and rest_length[h] > 0.0:
+            lengths += 1
+        if g >= 0 and not math.isnan(start[h]) and span[h] > 0.0:
+            if not (held and unknown[tail[prev_of(h)]] < 0 and unknown[tail[prev_of(g)]] < 0):
+                angles += 1
+    return lengths, angles
+
+
+@kernel
+def _gather_active(
+    mesh: HalfEdgeMesh, unknown: Indices, rest_length: Vectors, span: Vectors, start: Vectors,
+    since: Vectors, aim: Aim, bending: float, ends: Indices, length: Vectors, length_weight: Vectors,
+    hinges: Indices, target: Vectors, angle_weight: Vectors, scale_share: Vectors,
+) -> None:  # fmt: skip
+    """Fill the lists of active edges and hinges, in the order of their half-edges."""
+    tail, twin, alive, origin = mesh.tail, mesh.twin, mesh.alive, mesh.origin
+    by_curvature, radius, rate, floor, age = aim.by_curvature, aim.radius, aim.rate, aim.floor, aim.age
+    areas = np.empty(len(alive))
+    _rest_areas(mesh.rest_positions, mesh.faces, areas)
+    l, a = 0, 0
+    for h in range(len(twin)):
+        g = twin[h]
+        if not alive[h // 3] or 0 <= g < h:
+            continue
+        p1, p2, p3 = tail[h], tail[next_of(h)], tail[prev_of(h)]
+        held = unknown[p1] < 0 and unknown[p2] < 0
+        area = areas[h // 3] + (areas[g // 3] if g >= 0 else 0.0)
+        if not held and rest_length[h] > 0.0:
+            ends[l, 0], ends[l, 1] = p1, p2
+            length[l], length_weight[l] = rest_length[h], area
+            l += 1
+        if g >= 0 and not math.isnan(start[h]) and span[h] > 0.0:
+            p4 = tail[prev_of(g)]
+            if not (held and unknown[p3] < 0 and unknown[p4] < 0):
+                hinges[a, 0], hinges[a, 1], hinges[a, 2], hinges[a, 3] = p1, p2, p3, p4
+                if by_curvature:
+                    target[a] = curved_bend(start[h], span[h], radius, share_grown(rate * (age - since[h])))
+                else:
+                    target[a] = shrunk_bend(start[h], rate * (age - since[h]), floor)
+                angle_weight[a] = area * bending / (span[h] * span[h])
+                at_rest = hinge_bend(mesh.rest_positions, origin[p1], origin[p2], origin[p3], origin[p4])
+                scale_share[a] = 0.5 * angle_weight[a] * ((target[a] - at_rest) ** 2 + _LEAST_BEND**2)
+                a += 1
+
+
+@kernel
+def _rest_areas(positions: Vectors, faces: Indices, out: Vectors) -> None:
+    """The areas of faces (m, 3) at rest into out (m,)."""
+    for f in range(len(faces)):
+        p, q, r = faces[f, 0], faces[f, 1], faces[f, 2]
+        ux, uy, uz = _difference(positions, q, p)
+        vx, vy, vz = _difference(positions, r, p)
+        x, y, z = _cross(ux, uy, uz, vx, vy, vz)
+        out[f] = 0.5 * math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def _add_energy(
+    positions: Vectors, ends: Indices, rest_length: Vectors, length_weight: Vectors, length_island: Indices,
+    hinges: Indices, target: Vectors, angle_weight: Vectors, angle_island: Indices, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(ends)):
+        x, y, z = _difference(positions, ends[i, 1], ends[i, 0])
+        strain = math.sqrt(x * x + y * y + z * z) / rest_length[i] - 1.0
+        out[length_island[i]] += 0.5 * length_weight[i] * strain * strain
+    for i in range(len(hinges)):
+        bend = hinge_bend(positions, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3])
+        error = bend - target[i]
+        out[angle_island[i]] += 0.5 * angle_weight[i] * error * error
+
+
+@kernel
+def _add_gradient(
+    positions: Vectors, unknown: Indices, ends: Indices, rest_length: Vectors, length_weight: Vectors,
+    hinges: Indices, target: Vectors, angle_weight: Vectors, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(ends)):
+        a, b = unknown[ends[i, 0]], unknown[ends[i, 1]]
+        x, y, z = _difference(positions, ends[i, 1], ends[i, 0])
+        length = math.sqrt(x * x + y * y + z * z)
+        if not length > 0.0:
+            continue
+        force = length_weight[i] * (length / rest_length[i] - 1.0) / (rest_length[i] * length)
+        if a >= 0:
+            _add(out, a, -force, x, y, z)
+        if b >= 0:
+            _add(out, b, force, x, y, z)
+    for i in range(len(hinges)):
+        bend, ux, uy, uz, vx, vy, vz, s, t = hinge_gradient(
+            positions, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3]
+        )
+        moment = angle_weight[i] * (bend - target[i])
+        for k in range(4):
+            j = unknown[hinges[i, k]]
+            if j >= 0:
+                cu = -(1.0 - s) if k == 0 else (-s if k == 1 else (1.0 if k == 2 else 0.0))
+                cv = -(1.0 - t) if k == 0 else (-t if k == 1 else (0.0 if k == 2 else 1.0))
+                _add(out, j, moment, cu * ux + cv * vx, cu * uy + cv * vy, cu * uz + cv * vz)
+
+
+@kernel
+def _add_hessian_product(
+    positions: Vectors, moving: Vectors, unknown: Indices, ends: Indices, rest_length: Vectors,
+    length_weight: Vectors, hinges: Indices, target: Vectors, angle_weight: Vectors, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(ends)):
+        a, b = unknown[ends[i, 0]], unknown[ends[i, 1]]
+        x, y, z = _difference(positions, ends[i, 1], ends[i, 0])
+        dx, dy, dz = _difference(moving, ends[i, 1], ends[i, 0])
+        length = math.sqrt(x * x + y * y + z * z)
+        if not length > 0.0:
+            continue
+        k = length_weight[i] / (rest_length[i] * rest_length[i])
+        across = k * (1.0 - rest_length[i] / length)
+        along = (k - across) * (x * dx + y * dy + z * dz) / (length * length)
+        fx, fy, fz = across * dx + along * x, across * dy + along * y, across * dz + along * z
+        if a >= 0:
+            _add(out, a, -1.0, fx, fy, fz)
+        if b >= 0:
+            _add(out, b, 1.0, fx, fy, fz)
+    g, d = np.empty((4, 3)), np.empty((4, 3))
+    for i in range(len(hinges)):
+        hinge = hinges[i]
+        bend = _hinge_gradient_change(positions, moving, hinge[0], hinge[1], hinge[2], hinge[3], g, d)
+        turning = 0.0
+        for k in range(4):
+            for axis in range(3):
+                turning += g[k, axis] * moving[hinge[k], axis]
+        error = bend - target[i]
+        for k in range(4):
+            j = unknown[hinge[k]]
+            if j >= 0:
+                for axis in range(3):
+                    out[j, axis] += angle_weight[i] * (turning * g[k, axis] + error * d[k, axis])
+
+
+@kernel
+def _hinge_gradient_change(
+    positions: Vectors, moving: Vectors, p1: int, p2: int, p3: int, p4: int, g: Vectors, d: Vectors
+) -> float:
+    """The gradient of the bend into g (4, 3), its change with the movement into d (4, 3); returns the bend."""
+    g[:], d[:] = 0.0, 0.0
+    ex, ey, ez = _difference(positions, p2, p1)
+    ax, ay, az = _difference(positions, p3, p1)
+    bx, by, bz = _difference(positions, p4, p1)
+    mx, my, mz = _cross(ex, ey, ez, ax, ay, az)
+    nx, ny, nz = _cross(bx, by, bz, ex, ey, ez)
+    ee, mm, nn = ex * ex + ey * ey + ez * ez, mx * mx + my * my + mz * mz, nx * nx + ny * ny + nz * nz
+    if not (ee > _NO_EXTENT and mm > _NO_EXTENT and nn > _NO_EXTENT):
+        return 0.0
+    length = math.sqrt(ee)
+    dex, dey, dez = _difference(moving, p2, p1)
+    dax, day, daz = _difference(moving, p3, p1)
+    dbx, dby, dbz = _difference(moving, p4, p1)
+    d_length = (ex * dex + ey * dey + ez * dez) / length
+    for face in range(2):
+        if face == 0:
+            px, py, pz, dpx, dpy, dpz, qx, qy, qz, qq = ax, ay, az, dax, day, daz, mx, my, mz, mm
+            ux, uy, uz = _cross(dex, dey, dez, ax, ay, az)
+            vx, vy, vz = _cross(ex, ey, ez, dax, day, daz)
+        else:
+            px, py, pz, dpx, dpy, dpz, qx, qy, qz, qq = bx, by, bz, dbx, dby, dbz, nx, ny, nz, nn
+            ux, uy, uz = _cross(bx, by, bz, dex, dey, dez)
+            vx, vy, vz = _cross(dbx, dby, dbz, ex, ey, ez)
+        dqx, dqy, dqz = ux + vx, uy + vy, uz + vz
+        scale = -length / qq
+        d_scale = -(d_length - length * 2.0 * (qx * dqx + qy * dqy + qz * dqz) / qq) / qq
+        s = (px * ex + py * ey + pz * ez) / ee
+        d_s = (
+            dpx * ex + dpy * ey + dpz * ez + px * dex + py * dey + pz * dez - 2.0 * s * length * d_length
+        ) / ee
+        g[2 + face, 0], g[2 + face, 1], g[2 + face, 2] = scale * qx, scale * qy, scale * qz
+        d[2 + face, 0] = d_scale * qx + scale * dqx
+        d[2 + face, 1] = d_scale * qy + scale * dqy
+        d[2 + face, 2] = d_scale * qz + scale * dqz
+        for axis in range(3):
+            g[0, axis] -= (1.0 - s) * g[2 + face, axis]
+            g[1, axis] -= s * g[2 + face, axis]
+            d[0, axis] += d_s * g[2 + face, axis] - (1.0 - s) * d[2 + face, axis]
+            d[1, axis] -= d_s * g[2 + face, axis] + s * d[2 + face, axis]
+    return hinge_bend(positions, p1, p2, p3, p4)
+
+
+@formula
+def hinge_bend(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> float:
+    """The bend of a hinge [rad]; 0 where a face or the edge has no extent."""
+    ex, ey, ez = _difference(positions, p2, p1)
+    ax, ay, az = _difference(positions, p3, p1)
+    bx, by, bz = _difference(positions, p4, p1)
+    mx, my, mz = _cross(ex, ey, ez, ax, ay, az)
+    nx, ny, nz = _cross(bx, by, bz, ex, ey, ez)
+    tx, ty, tz = _cross(mx, my, mz, nx, ny, nz)
+    length = math.sqrt(ex * ex + ey * ey + ez * ez)
+    cosine = mx * nx + my * ny + mz * nz
+    if not (length > 0.0 and (mx * mx + my * my + mz * mz) > 0.0 and (nx * nx + ny * ny + nz * nz) > 0.0):
+        return 0.0
+    return math.atan2((tx * ex + ty * ey + tz * ez) / length, cosine)
+
+
+HingeGradient = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@formula
+def hinge_gradient(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> HingeGradient:
+    """The bend [rad], its gradients u over p3 and v over p4 [rad per size], and where the feet of p3 and p4
+    lie along the edge, s and t: the gradient is -(1 - s) u - (1 - t) v over p1 and -s u - t v over p2.
+
+    All zero where a face or the edge has no extent.
+    """
+    ex, ey, ez = _difference(positions, p2, p1)
+    ax, ay, az = _difference(positions, p3, p1)
+    bx, by, bz = _difference(positions, p4, p1)
+    mx, my, mz = _cross(ex, ey, ez, ax, ay, az)
+    nx, ny, nz = _cross(bx, by, bz, ex, ey, ez)
+    tx, ty, tz = _cross(mx, my, mz, nx, ny, nz)
+    ee, mm, nn = ex * ex + ey * ey + ez * ez, mx * mx + my * my + mz * mz, nx * nx + ny * ny + nz * nz
+    if not (ee > _NO_EXTENT and mm > _NO_EXTENT and nn > _NO_EXTENT):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    length = math.sqrt(ee)
+    bend = math.atan2((tx * ex + ty * ey + tz * ez) / length, mx * nx + my * ny + mz * nz)
+    cu, cv = -length / mm, -length / nn
+    s, t = (ax * ex + ay * ey + az * ez) / ee, (bx * ex + by * ey + bz * ez) / ee
+    return bend, cu * mx, cu * my, cu * mz, cv * nx, cv * ny, cv * nz, s, t
+
+
+@formula
+def _difference(points: Vectors, a: int, b: int) -> tuple[float, float, float]:
+    return points[a, 0] - points[b, 0], points[a, 1] - points[b, 1], points[a, 2] - points[b, 2]
+
+
+@formula
+def _cross(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float
+) -> tuple[float, float, float]:
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@formula
+def _add(out: Vectors, i: int, scale: float, x: float, y: float, z: float) -> None:
+    out[i, 0] += scale * x
+    out[i, 1] += scale * y
+    out[i, 2] += scale * z
