@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,11 @@ _ENOUGH = 1e-4  # least share of the decrease that the slope promises
 _SHORTER = 0.4
 _TRIALS = 14
 
+FAR = 0.1  # the gap above which a guess is tried
+
 Flags = NDArray[np.bool_]
+Guess = Callable[[Flags], Vectors]
+"""Positions (n, 3) with the free vertices of some islands (k,) where a guess puts them."""
 
 
 class Solved(NamedTuple):
@@ -55,6 +60,23 @@ def slide(elastic: Elastic, vectors: Vectors, held: Flags) -> Vectors:
 def sum_islands(elastic: Elastic, a: Vectors, b: Vectors) -> Vectors:
     """The scalar products of two fields (v, 3), for each island (k,)."""
     return np.bincount(elastic.island, _dot(a, b), len(elastic.scale))
+
+
+def jump(elastic: Elastic, positions: Vectors, value: Vectors, far: Flags, guess: Guess) -> bool:
+    """Take the guess for the islands that are far from their minimum, where it lowers their energy; changes
+    positions (n, 3) and energies (k,), and says whether it did.
+    """
+    if not far.any():
+        return False
+    e = elastic
+    guessed = guess(far)
+    lift(e, guessed)
+    new = energy(e, guessed)
+    better = far & (new < value)
+    moved = e.free[better[e.island]]
+    positions[moved] = guessed[moved]
+    value[better] = new[better]
+    return bool(better.any())
 
 
 def search(

@@ -35,7 +35,8 @@ class Elastic(NamedTuple):
 
     free: int32 (v,), the vertices that may move, by island and ascending in it; unknown: int32 (n,), where each film vertex
     stands in `free`, -1 if it is held. ends: int32 (l, 2), rest_length and length_weight (l,); hinges: int32
-    (a, 4) as drawn in `mesh.dihedral`, target [rad] and angle_weight (a,). normals (v, 3) and offsets (v,)
+    (a, 4) as drawn in `mesh.dihedral`, of the half-edges hinge_edge (a,), target [rad], bend_at_rest [rad] and
+    angle_weight (a,). normals (v, 3) and offsets (v,)
     are the planes n . p = offset that free vertices stay above. island int32 (v,), length_island (l,),
     angle_island (a,): which island of free film each belongs to; no element connects two. scale: (k,), the
     energy of each island if it lay as at rest, by which all that is measured on it is divided.
@@ -47,7 +48,9 @@ class Elastic(NamedTuple):
     rest_length: Vectors
     length_weight: Vectors
     hinges: Indices
+    hinge_edge: Indices
     target: Vectors
+    bend_at_rest: Vectors
     angle_weight: Vectors
     normals: Vectors
     offsets: Vectors
@@ -86,16 +89,18 @@ def make_elastic(
     lengths, angles = _count_active(mesh, unknown, rest_length, span, angle_start)
     ends, hinges = np.empty((lengths, 2), np.int32), np.empty((angles, 4), np.int32)
     length, length_weight = np.empty(lengths), np.empty(lengths)
-    target, angle_weight, scale_share = np.empty(angles), np.empty(angles), np.empty(angles)
+    target, bend_at_rest, angle_weight = np.empty(angles), np.empty(angles), np.empty(angles)
+    hinge_edge = np.empty(angles, np.int32)
     _gather_active(
         mesh, unknown, rest_length, span, angle_start, angle_age, aim, thickness * thickness / 12.0,
-        ends, length, length_weight, hinges, target, angle_weight, scale_share,
+        ends, length, length_weight, hinges, hinge_edge, target, bend_at_rest, angle_weight,
     )  # fmt: skip
     island, length_island, angle_island, islands = label_islands(unknown, len(free), ends, hinges)
     order = np.argsort(island, kind="stable")
     free, island = free[order], island[order]
     origin = mesh.origin[free]
     normals = mesh.rest_normals[origin]
+    straightened = 0.5 * angle_weight * ((target - bend_at_rest) ** 2 + _LEAST_BEND**2)
     return Elastic(
         free=free,
         unknown=_number(free, count),
@@ -103,14 +108,16 @@ def make_elastic(
         rest_length=length,
         length_weight=length_weight,
         hinges=hinges,
+        hinge_edge=hinge_edge,
         target=target,
+        bend_at_rest=bend_at_rest,
         angle_weight=angle_weight,
         normals=normals,
         offsets=np.einsum("ij,ij->i", normals, mesh.rest_positions[origin]),
         island=island,
         length_island=length_island,
         angle_island=angle_island,
-        scale=np.bincount(angle_island, scale_share, islands)
+        scale=np.bincount(angle_island, straightened, islands)
         + np.bincount(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
     )
 
@@ -180,13 +187,14 @@ def _count_active(
 def _gather_active(
     mesh: HalfEdgeMesh, unknown: Indices, rest_length: Vectors, span: Vectors, start: Vectors,
     since: Vectors, aim: Aim, bending: float, ends: Indices, length: Vectors, length_weight: Vectors,
-    hinges: Indices, target: Vectors, angle_weight: Vectors, scale_share: Vectors,
+    hinges: Indices, hinge_edge: Indices, target: Vectors, bend_at_rest: Vectors, angle_weight: Vectors,
 ) -> None:  # fmt: skip
     """Fill the lists of active edges and hinges, in the order of their half-edges."""
     tail, twin, alive, origin = mesh.tail, mesh.twin, mesh.alive, mesh.origin
     by_curvature, radius, rate, floor, age = aim.by_curvature, aim.radius, aim.rate, aim.floor, aim.age
+    rest = mesh.rest_positions
     areas = np.empty(len(alive))
-    _rest_areas(mesh.rest_positions, mesh.faces, areas)
+    _rest_areas(rest, mesh.faces, areas)
     l, a = 0, 0
     for h in range(len(twin)):
         g = twin[h]
@@ -208,8 +216,8 @@ def _gather_active(
                 else:
                     target[a] = shrunk_bend(start[h], rate * (age - since[h]), floor)
                 angle_weight[a] = area * bending / (span[h] * span[h])
-                at_rest = hinge_bend(mesh.rest_positions, origin[p1], origin[p2], origin[p3], origin[p4])
-                scale_share[a] = 0.5 * angle_weight[a] * ((target[a] - at_rest) ** 2 + _LEAST_BEND**2)
+                hinge_edge[a] = h
+                bend_at_rest[a] = hinge_bend(rest, origin[p1], origin[p2], origin[p3], origin[p4])
                 a += 1
 
 

@@ -13,18 +13,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from weathercoat.deform.descending import Flags, Solved, lift, resting, search, slide, sum_islands
+from weathercoat.deform.descending import (
+    FAR,
+    Flags,
+    Guess,
+    Solved,
+    jump,
+    lift,
+    resting,
+    search,
+    slide,
+    sum_islands,
+)
 from weathercoat.deform.energy import Elastic, energy, gradient
 from weathercoat.deform.factor import Factors
-from weathercoat.deform.stiffness import Places, fill_blocks, find_places
+from weathercoat.deform.stiffness import Places, fill_blocks, find_places, hold_and_damp
 from weathercoat.mesh.surface import Vectors
 
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-12, 1e3  # of the mean of a diagonal block
 _NEAR = 1e-2  # the gap below which all of the second derivative is tried
-_HELD = 1e6  # stiffness that holds a vertex on its plane, relative to its own
 
 
-def minimise(elastic: Elastic, positions: Vectors, *, iterations: int, tolerance: float) -> Solved:
+def minimise_by_newton(
+    elastic: Elastic, positions: Vectors, guess: Guess, *, iterations: int, tolerance: float
+) -> Solved:
     """Bring free vertices to a minimum of the energy, down to a gap (see `Solved`); changes positions (n, 3).
 
     No step raises an island's energy.
@@ -46,6 +58,8 @@ def minimise(elastic: Elastic, positions: Vectors, *, iterations: int, tolerance
         _factor(e, places, factors, positions, damping, held, live, whole)
         direction = slide(e, -factors.solve(np.flatnonzero(live), slope), held)
         gap = np.where(live, -0.5 * sum_islands(e, slope, direction) / e.scale, gap)
+        if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
+            continue
         positions[:], value, share = search(e, positions, value, slope, direction, live)
         live &= gap > tolerance
         if not live.any():
@@ -83,9 +97,5 @@ def _damped(
 ) -> Vectors:
     e = elastic
     blocks = fill_blocks(e, places, positions, whole)
-    diagonal = places.pattern.diagonal()
-    stiffness = np.abs(np.trace(blocks[diagonal], axis1=1, axis2=2)) / 3.0
-    blocks[diagonal] += (damping[e.island] * stiffness)[:, None, None] * np.eye(3)
-    normals = e.normals[held]
-    blocks[diagonal[held]] += _HELD * stiffness[held][:, None, None] * normals[:, :, None] * normals[:, None, :]
+    hold_and_damp(blocks, places.pattern.diagonal(), e.normals, held, damping[e.island])
     return blocks

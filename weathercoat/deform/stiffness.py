@@ -22,6 +22,9 @@ from weathercoat.deform.energy import Elastic, hinge_gradient
 from weathercoat.mesh.surface import Indices, Vectors
 
 
+_HELD = 1e6  # stiffness that holds a vertex on its plane, relative to its own
+
+
 class Places(NamedTuple):
     """The pattern of an elastic's matrix, and where its edges (l, 3) and hinges (a, 10) add to."""
 
@@ -51,6 +54,19 @@ def fill_blocks(elastic: Elastic, places: Places, positions: Vectors, whole: NDA
         blocks,
     )  # fmt: skip
     return blocks
+
+
+def hold_and_damp(
+    blocks: Vectors, diagonal: Indices, normals: Vectors, held: NDArray[np.bool_], damping: Vectors
+) -> None:
+    """Stiffen unknowns (v,) by shares of their own stiffness (Levenberg's damping), and those held on their
+    planes along their normals (v, 3), so that they only slide; changes blocks.
+    """
+    stiffness = np.abs(np.trace(blocks[diagonal], axis1=1, axis2=2)) / 3.0
+    blocks[diagonal] += (damping * stiffness)[:, None, None] * np.eye(3)
+    normal = normals[held]
+    pressed = _HELD * stiffness[held][:, None, None]
+    blocks[diagonal[held]] += pressed * normal[:, :, None] * normal[:, None, :]
 
 
 @kernel
