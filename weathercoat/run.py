@@ -6,7 +6,7 @@ import fnmatch
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -16,7 +16,7 @@ import numpy as np
 from weathercoat.compile import Compiling, remove_unused, watch_compiling
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
-from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.frame import make_frame
@@ -118,6 +118,7 @@ def run_asset(
             meshes={"input": measure_surface(surface), "film": measure_surface(simulation.surface)},
             notes=meshed.notes,
             stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
+            solver=asdict(simulation.solving),
             snapshots=recorder.figures,
         )
         write_json(folder / run_folder.REPORT, report)
@@ -300,6 +301,8 @@ class _SnapshotRecorder:
                     flake_areas=np.asarray(simulation.flake_areas) * size**2,
                     strain=residual.strain_rms,
                     residual=residual.angle_rms,
+                    energy=residual.energy,
+                    imbalance=residual.imbalance,
                 )
             )
         if self.config.output.preview:

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from tests.sim.runs import make_run
 from tests.zoo import make_lattice
 from weathercoat.deform.constraints import Constraints, make_constraints, release
-from weathercoat.deform.deformation import DeformParameters, deform
+from weathercoat.deform.deformation import deform
+from weathercoat.deform.descending import Solved
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.plain import deform_plainly, find_active
 from weathercoat.deform.runs import LANES, TILE, Runs, bucket
 from weathercoat.mesh.halfedge import HalfEdgeMesh, make_half_edges
@@ -137,13 +139,14 @@ def step_beside(simulation: Simulation) -> None:
 
     def both(
         mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float, **how: Any
-    ) -> None:
+    ) -> Solved:
         check_packing(mesh, constraints)
         beside = mesh._replace(positions=mesh.positions.copy())
         deform_plainly(beside, constraints, parameters, age)
-        deform(mesh, constraints, parameters, age, **how)
+        solved = deform(mesh, constraints, parameters, age, **how)
         used = mesh.vertex_count
         assert beside.positions[:used].tobytes() == mesh.positions[:used].tobytes()
+        return solved
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "deform", both)

@@ -9,13 +9,15 @@ from tests import zoo
 from tests.zoo import find_edge, make_mesh
 from weathercoat.deform.angle import DIHEDRAL
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
-from weathercoat.deform.deformation import DeformParameters, deform, measure_residual
+from weathercoat.deform.deformation import deform
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.plain import (
     bends_wanted,
     deform_plainly,
     project_angles,
     project_lengths,
 )
+from weathercoat.deform.residual import measure_residual
 from weathercoat.deform.runs import LANES, Runs
 from weathercoat.mesh.dihedral import all_bends
 from weathercoat.mesh.halfedge import HalfEdgeMesh, cut_edge, make_event_log, next_of, prev_of

@@ -150,6 +150,7 @@ def report(**changes: Any) -> dict[str, Any]:
         "meshes": {"input": measure_surface(make_surface(*make_sheet()))},
         "notes": [Note("W-DEGENERATE", 2, "2 faces without area dropped")],
         "stopped": "all steps are done",
+        "solver": {"iterations": 10, "largest_gap": None, "unfinished_steps": 0},
         "snapshots": [measure_snapshot(make_snapshot(lost=2))],
     }
     return make_report(**(content | changes))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.zoo import fans_by_vertex
-from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.halfedge import check_half_edges, make_twins
 from weathercoat.mesh.surface import Surface
@@ -53,10 +53,14 @@ CURL = {
     "curl_rate": 4.0,
     "curl_angle_rate": 0.8,
     "curl_angle_floor": 2.6,
+    "deformation_solver": "sweeps",
     "deformation_sweeps": 5,
     "deformation_angle": "dihedral",
     "deformation_angle_stiffness": 1.0,
     "deformation_sleep_tolerance": 0.0,
+    "deformation_iterations": 50,
+    "deformation_tolerance": 1e-3,
+    "deformation_film_thickness": 1e-2,
 }
 STAIN = {
     "dust_rate": 0.5,

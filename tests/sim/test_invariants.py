@@ -146,7 +146,7 @@ def test_everything_falls_where_nothing_holds() -> None:
 
 def test_defaults_of_the_tests_name_every_parameter() -> None:
     """So that tuning a default cannot change what these tests run."""
-    from weathercoat.deform.deformation import DeformParameters
+    from weathercoat.deform.parameters import DeformParameters
     from weathercoat.film.state import FilmParameters
 
     assert set(FilmParameters.__dataclass_fields__) - set(FILM) == {"defects_density"}

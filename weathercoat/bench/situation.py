@@ -12,7 +12,7 @@ from pathlib import Path
 from weathercoat.bench.layout import BREAKS_PER_FACE, SEPARATED_SHARE, lay_out_load
 from weathercoat.config.load import Override, load_config
 from weathercoat.config.schema import Config
-from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.surface import Surface
 from weathercoat.run import fill

@@ -286,9 +286,13 @@ class Curl(Section):
 
 
 class Deformation(Section):
-    """Position-based deformation (section 4)."""
+    """How separated film is deformed: by position-based sweeps (section 4), or to a minimum of its energy."""
 
-    sweeps: Whole = parameter(10, "Passes over all constraints in a step", ge=0, le=100_000)
+    solver: Literal["sweeps", "descent", "newton", "none"] = parameter(
+        "sweeps",
+        "Sweeps (the paper); descent or newton, which converge; none leaves the film where it separated",
+    )
+    sweeps: Whole = parameter(10, "Passes over all constraints in a step, with sweeps", ge=0, le=100_000)
     angle: Literal["dihedral", "split", "arccos"] = parameter(
         "dihedral", "Angle constraint: signed dihedral, the paper's split form, or plain arccos"
     )
@@ -298,6 +302,21 @@ class Deformation(Section):
         "Film sleeps for a few steps while nothing round it moves by this much in one [sizes]; 0: never",
         ge=0,
         le=1,
+    )
+    iterations: Whole = parameter(50, "Most iterations in a step, with descent and newton", ge=1, le=100_000)
+    tolerance: Real = parameter(
+        1e-3,
+        "With descent and newton: how far above its minimum a step may leave the energy of a piece, relative "
+        "to that of the piece lying flat",
+        gt=0,
+        lt=1,
+    )
+    film_thickness: Real = parameter(
+        1e-3,
+        "With descent and newton: thickness of the film; it bends against stretching as its square to 12",
+        unit="sizes",
+        ge=1e-6,
+        le=0.1,
     )
 
 

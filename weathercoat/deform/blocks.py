@@ -43,8 +43,8 @@ def make_pattern(count: int, elements: tuple[Indices, ...]) -> Pattern:
 
 
 def find_blocks(pattern: Pattern, corners: Indices) -> Indices:
-    """Where the pairs of corners of each element (l, c) add to, (l, c (c + 1) / 2), -1 where one is held; in the
-    order (0, 0), (0, 1), (1, 1), (0, 2), ...
+    """Where the pairs of corners of each element (l, c) add to, (l, c (c + 1) / 2), -1 where one is held;
+    in the order (0, 0), (0, 1), (1, 1), (0, 2), ...
     """
     count = corners.shape[1]
     out = np.empty((len(corners), count * (count + 1) // 2), np.int32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,24 @@ Guess = Callable[[Flags], Vectors]
 
 
 class Solved(NamedTuple):
-    """How a solver ended: iterations, of the island that took most; gap, the largest estimate of how far an
-    island's energy is above its minimum, in units of its energy at rest; unfinished, the islands whose gap is
-    above the tolerance.
+    """How a solver ended: iterations, of the island that took most, or sweeps; gap, the largest estimate of
+    how far an island's energy is above its minimum, in units of its energy at rest, None where a solver
+    knows none; unfinished, the islands whose gap is above the tolerance.
     """
 
     iterations: int
-    gap: float
+    gap: float | None
     unfinished: int
+
+
+class Minimise(Protocol):
+    """A solver that brings free vertices to a minimum of the energy, down to a gap (see `Solved`) or until
+    its iterations are spent; changes positions (n, 3). No step raises an island's energy.
+    """
+
+    def __call__(
+        self, elastic: Elastic, positions: Vectors, guess: Guess, *, iterations: int, tolerance: float
+    ) -> Solved: ...
 
 
 def lift(elastic: Elastic, positions: Vectors) -> None:
@@ -59,7 +69,7 @@ def slide(elastic: Elastic, vectors: Vectors, held: Flags) -> Vectors:
 
 def sum_islands(elastic: Elastic, a: Vectors, b: Vectors) -> Vectors:
     """The scalar products of two fields (v, 3), for each island (k,)."""
-    return np.bincount(elastic.island, _dot(a, b), len(elastic.scale))
+    return np.bincount(elastic.island, _dot(a, b), len(elastic.scale)).astype(np.float64, copy=False)
 
 
 def jump(elastic: Elastic, positions: Vectors, value: Vectors, far: Flags, guess: Guess) -> bool:
@@ -84,18 +94,18 @@ def search(
 ) -> tuple[Vectors, Vectors, Vectors]:
     """Go along a direction (v, 3) as far as each live island's energy falls enough, over the substrate.
 
-    From energies (k,) and the gradient (v, 3). Returns the new positions, their energies, and the share of the
-    direction that each island went, 0 where none would do.
+    From energies (k,) and the gradient (v, 3). Returns the new positions, their energies, and the share of
+    the direction that each island went, 0 where none would do.
     """
     e = elastic
+    live = live & np.isfinite(sum_islands(e, direction, direction))
+    direction = np.where(live[e.island, None], direction, 0.0)
     share = live.astype(np.float64)
-    searching = live
     for _ in range(_TRIALS):
         reached = _go(e, positions, direction, share)
         new = energy(e, reached)
         promised = sum_islands(e, slope, reached[e.free] - positions[e.free])
-        with np.errstate(invalid="ignore"):
-            searching = live & ~((new <= value + _ENOUGH * promised) & (promised < 0.0)) & (share > 0.0)
+        searching = live & ~((new <= value + _ENOUGH * promised) & (promised < 0.0))
         if not searching.any():
             return reached, new, share
         share = np.where(searching, _SHORTER * share, share)

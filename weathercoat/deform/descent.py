@@ -1,18 +1,23 @@
-"""L-BFGS preconditioned with the factors of one Gauss-Newton matrix a step.
+"""L-BFGS on islands of film, preconditioned with the factors of one matrix a step.
 
-The matrix is that of the step's start, so it knows the topology as cracks have left it and where the film has
-curled to; what has changed since, the last few gradients tell. Each island has its own memory and its own end.
+The matrix is the Gauss-Newton one at the step's start, so it knows the topology as cracks have left it and
+how far the film has curled; what has changed since, the last few gradients tell. Each island has a memory,
+a step length and an end of its own.
 
-Sources: Nocedal, Updating quasi-Newton matrices with limited storage, 1980; Liu et al., Quasi-Newton methods for
-real-time simulation of hyperelastic materials, 2017.
+Sources: Nocedal, Updating quasi-Newton matrices with limited storage, 1980; Liu et al., Quasi-Newton
+methods for real-time simulation of hyperelastic materials, 2017.
 """
 
 from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
 from weathercoat.deform.descending import (
     FAR,
+    Flags,
     Guess,
     Solved,
     jump,
@@ -24,65 +29,85 @@ from weathercoat.deform.descending import (
 )
 from weathercoat.deform.energy import Elastic, energy, gradient
 from weathercoat.deform.factor import Factors
-from weathercoat.deform.stiffness import fill_blocks, find_places, hold_and_damp
+from weathercoat.deform.stiffness import Places, fill_blocks, find_places, hold_and_damp
 from weathercoat.mesh.surface import Vectors
 
-_MEMORY = 6
-_DAMPING = 1e-4
+_REMEMBERED = 6  # pairs; 3 need more iterations, 12 are not better
+_DAMPING = 1e-4  # of the mean of a diagonal block
+_LEAST_COSINE = 1e-9  # between a move and the change of the gradient over it, to remember them
+
+
+class Pair(NamedTuple):
+    """A move (v, 3), the change of the gradient over it (v, 3), and 1 over their product by island (k,), 0
+    where they tell nothing.
+    """
+
+    move: Vectors
+    change: Vectors
+    over: Vectors
 
 
 def minimise_by_descent(
     elastic: Elastic, positions: Vectors, guess: Guess, *, iterations: int, tolerance: float
 ) -> Solved:
+    """A `Minimise`."""
     e = elastic
     lift(e, positions)
     count = len(e.scale)
-    bounds = np.searchsorted(e.island, np.arange(count + 1))
     places = find_places(e)
-    factors = Factors(places.pattern, bounds, 3)
-    everything = np.arange(count)
+    factors = Factors(places.pattern, np.searchsorted(e.island, np.arange(count + 1)), 3)
+    pairs: deque[Pair] = deque(maxlen=_REMEMBERED)
     live, gap = np.ones(count, np.bool_), np.full(count, np.inf)
-    value = energy(e, positions)
-    refactor = True
-    moves, turns, overs = [], [], []
-    slope = gradient(e, positions)
+    value, slope = energy(e, positions), gradient(e, positions)
+    _prepare(e, places, factors, positions, slope)
     done = 0
     for done in range(1, iterations + 1):
         held = resting(e, positions, slope)
-        if refactor:
-            blocks = fill_blocks(e, places, positions, np.zeros(count, np.bool_))
-            hold_and_damp(blocks, places.pattern.diagonal(), e.normals, held, np.full(len(e.free), _DAMPING))
-            factors.factor(np.flatnonzero(live), blocks)
-            refactor = False
         free_slope = slide(e, slope, held)
-        q = free_slope.copy()
-        alphas = []
-        for m, t, o in zip(reversed(moves), reversed(turns), reversed(overs)):
-            a = o * sum_islands(e, m, q)
-            alphas.append(a)
-            q -= a[e.island][:, None] * t
-        q = factors.solve(np.flatnonzero(live), q)
-        for (m, t, o), a in zip(zip(moves, turns, overs), reversed(alphas)):
-            b = o * sum_islands(e, t, q)
-            q += (a - b)[e.island][:, None] * m
-        direction = slide(e, -q, held)
+        direction = slide(e, _downhill(e, factors, pairs, free_slope, live), held)
         gap = np.where(live, -0.5 * sum_islands(e, free_slope, direction) / e.scale, gap)
         if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
-            refactor = True
             slope = gradient(e, positions)
+            _prepare(e, places, factors, positions, slope)
             continue
-        before = positions[e.free].copy()
-        positions[:], value, share = search(e, positions, value, free_slope, direction, live)
-        live &= gap > tolerance
+        before, slope_before = positions[e.free], slope
+        positions[:], value, _ = search(e, positions, value, free_slope, direction, live)
+        live &= ~(gap <= tolerance)
         if not live.any():
             break
-        new = gradient(e, positions)
-        m, t = positions[e.free] - before, new - slope
-        mt = sum_islands(e, m, t)
-        good = live & (mt > 1e-12 * np.sqrt(sum_islands(e, m, m) * sum_islands(e, t, t))) & (mt > 0)
-        o = np.where(good, 1.0 / np.where(good, mt, 1.0), 0.0)
-        moves.append(m); turns.append(t); overs.append(o)
-        if len(moves) > _MEMORY:
-            del moves[0], turns[0], overs[0]
-        slope = new
+        slope = gradient(e, positions)
+        pairs.append(_pair(e, positions[e.free] - before, slope - slope_before))
     return Solved(done, float(gap.max(initial=0.0)), int(live.sum()))
+
+
+def _prepare(elastic: Elastic, places: Places, factors: Factors, positions: Vectors, slope: Vectors) -> None:
+    """Factor the matrix of all islands where they are."""
+    e = elastic
+    blocks = fill_blocks(e, places, positions, np.zeros(len(e.scale), np.bool_))
+    damping = np.full(len(e.free), _DAMPING)
+    hold_and_damp(blocks, places.pattern.diagonal(), e.normals, resting(e, positions, slope), damping)
+    factors.factor(np.arange(len(e.scale)), blocks)
+
+
+def _downhill(elastic: Elastic, factors: Factors, pairs: deque[Pair], slope: Vectors, live: Flags) -> Vectors:
+    """The direction (v, 3) against the gradient by the factors and what is remembered: the two loops."""
+    e = elastic
+    left = slope
+    shares = []
+    for pair in reversed(pairs):
+        share = pair.over * sum_islands(e, pair.move, left)
+        left = left - share[e.island][:, None] * pair.change
+        shares.append(share)
+    out = factors.solve(np.flatnonzero(live), left)
+    for pair, share in zip(pairs, reversed(shares), strict=True):
+        back = pair.over * sum_islands(e, pair.change, out)
+        out += (share - back)[e.island][:, None] * pair.move
+    return -out
+
+
+def _pair(elastic: Elastic, move: Vectors, change: Vectors) -> Pair:
+    e = elastic
+    product = sum_islands(e, move, change)
+    size = np.sqrt(sum_islands(e, move, move) * sum_islands(e, change, change))
+    tells = product > _LEAST_COSINE * size
+    return Pair(move, change, np.where(tells, 1.0 / np.where(tells, product, 1.0), 0.0))

@@ -1,14 +1,14 @@
 """The energy that the converged solvers minimise: strain of the active edges, bend of the active hinges.
 
     E = sum over edges  3 A_e / 2 (l / L - 1)^2
-      + sum over hinges 3 A_e / 2 (t^2 / 12) ((bend - target) / span)^2
+      + sum over hinges 3 A_e / 4 (t^2 / 12) ((bend - target) / span)^2
 
 in units of the film's stretching stiffness (Young's modulus times thickness) times a size squared. A_e is a
 third of the rest area of the edge's faces, l its length and L its rest length, span the distance between the
-centres of its two faces at rest, so that the bend over the span is a curvature, and t the film's thickness.
-On equilateral triangles these sums are those of an isotropic plate whose Poisson's ratio is 1/3: stretching
-E t, bending E t^3 / 12, the ratio t^2 / 12 (docs/accuracy.md derives it). The substrate is an inequality:
-no free vertex lies below the plane of its origin.
+centres of its two faces at rest, and t the film's thickness. On equilateral triangles an edge network
+stretches like a plate whose Poisson's ratio is 1/3, and rolled into a cylinder it bends like that plate, so
+that bending is to stretching as t^2 / 12; docs/accuracy.md derives both. The substrate is an inequality: no
+free vertex lies below the plane of its origin.
 
 Source of the hinge's energy: Grinspun et al., Discrete shells, 2003.
 """
@@ -21,7 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from weathercoat.compile import formula, kernel
+from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.islands import label_islands
+from weathercoat.deform.parameters import Aim, DeformParameters
 from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
@@ -33,13 +35,13 @@ _LEAST_BEND, _LEAST_STRAIN = 1e-3, 1e-6  # what an island's energy is measured b
 class Elastic(NamedTuple):
     """The active edges and hinges of film that may move, with targets and weights; k islands.
 
-    free: int32 (v,), the vertices that may move, by island and ascending in it; unknown: int32 (n,), where each film vertex
-    stands in `free`, -1 if it is held. ends: int32 (l, 2), rest_length and length_weight (l,); hinges: int32
-    (a, 4) as drawn in `mesh.dihedral`, of the half-edges hinge_edge (a,), target [rad], bend_at_rest [rad] and
-    angle_weight (a,). normals (v, 3) and offsets (v,)
-    are the planes n . p = offset that free vertices stay above. island int32 (v,), length_island (l,),
-    angle_island (a,): which island of free film each belongs to; no element connects two. scale: (k,), the
-    energy of each island if it lay as at rest, by which all that is measured on it is divided.
+    free: int32 (v,), the vertices that may move, by island and ascending in it; unknown: int32 (n,), where
+    each film vertex stands in `free`, -1 if it is held. ends: int32 (l, 2), rest_length and length_weight
+    (l,); hinges: int32 (a, 4) as drawn in `mesh.dihedral`, of the half-edges hinge_edge (a,), target [rad],
+    bend_at_rest [rad] and angle_weight (a,). normals (v, 3) and offsets (v,) are the planes n . p = offset
+    that free vertices stay above. island int32 (v,), length_island (l,), angle_island (a,): which island of
+    free film each belongs to; no element connects two. scale: (k,), the energy of each island if it lay as
+    at rest, by which all that is measured on it is divided.
     """
 
     free: Indices
@@ -60,39 +62,21 @@ class Elastic(NamedTuple):
     scale: Vectors
 
 
-class Aim(NamedTuple):
-    """How targets follow from an age: the fields of `DeformParameters` that kernels need."""
-
-    by_curvature: bool
-    radius: float
-    rate: float
-    floor: float
-    age: float
-
-
 def make_elastic(
-    mesh: HalfEdgeMesh,
-    is_free: Vectors,
-    rest_length: Vectors,
-    span: Vectors,
-    angle_start: Vectors,
-    angle_age: Vectors,
-    aim: Aim,
-    thickness: float,
+    mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float
 ) -> Elastic:
-    """What acts on the film vertices with `is_free` (3 m,) > 0 and a face; arrays over half-edges as in
-    `Constraints`; thickness in sizes.
-    """
+    """What acts on the film that may move, with the targets of an age."""
+    c, aim, thickness = constraints, parameters.aim_at(age), parameters.deformation_film_thickness
     count = mesh.vertex_count
-    free = np.flatnonzero((is_free[:count] > 0.0) & (mesh.half_edge[:count] >= 0)).astype(np.int32)
+    free = np.flatnonzero((c.inverse_mass[:count] > 0.0) & (mesh.half_edge[:count] >= 0)).astype(np.int32)
     unknown = _number(free, count)
-    lengths, angles = _count_active(mesh, unknown, rest_length, span, angle_start)
+    lengths, angles = _count_active(mesh, unknown, c.rest_length, c.span, c.angle_start)
     ends, hinges = np.empty((lengths, 2), np.int32), np.empty((angles, 4), np.int32)
     length, length_weight = np.empty(lengths), np.empty(lengths)
     target, bend_at_rest, angle_weight = np.empty(angles), np.empty(angles), np.empty(angles)
     hinge_edge = np.empty(angles, np.int32)
     _gather_active(
-        mesh, unknown, rest_length, span, angle_start, angle_age, aim, thickness * thickness / 12.0,
+        mesh, unknown, c.rest_length, c.span, c.angle_start, c.angle_age, aim, thickness * thickness / 12.0,
         ends, length, length_weight, hinges, hinge_edge, target, bend_at_rest, angle_weight,
     )  # fmt: skip
     island, length_island, angle_island, islands = label_islands(unknown, len(free), ends, hinges)
@@ -117,9 +101,14 @@ def make_elastic(
         island=island,
         length_island=length_island,
         angle_island=angle_island,
-        scale=np.bincount(angle_island, straightened, islands)
-        + np.bincount(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
+        scale=_sum(angle_island, straightened, islands)
+        + _sum(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
     )
+
+
+def _sum(island: Indices, values: Vectors, count: int) -> Vectors:
+    """The sums of values over each of `count` islands."""
+    return np.bincount(island, values, count).astype(np.float64, copy=False)
 
 
 def _number(free: Indices, count: int) -> Indices:
@@ -163,6 +152,16 @@ def hessian_product(elastic: Elastic, positions: Vectors, direction: Vectors) ->
     return out
 
 
+def sum_of_forces(elastic: Elastic, positions: Vectors) -> Vectors:
+    """The magnitudes of all forces on each free vertex, (v,), whatever their directions."""
+    e = elastic
+    out = np.zeros(len(e.free))
+    _add_magnitudes(
+        positions, e.unknown, e.ends, e.rest_length, e.length_weight, e.hinges, e.target, e.angle_weight, out
+    )
+    return out
+
+
 @kernel
 def _count_active(
     mesh: HalfEdgeMesh, unknown: Indices, rest_length: Vectors, span: Vectors, start: Vectors
@@ -177,9 +176,10 @@ def _count_active(
         held = unknown[tail[h]] < 0 and unknown[tail[next_of(h)]] < 0
         if not held and rest_length[h] > 0.0:
             lengths += 1
-        if g >= 0 and not math.isnan(start[h]) and span[h] > 0.0:
-            if not (held and unknown[tail[prev_of(h)]] < 0 and unknown[tail[prev_of(g)]] < 0):
-                angles += 1
+        if g < 0 or math.isnan(start[h]) or not span[h] > 0.0:
+            continue
+        if not (held and unknown[tail[prev_of(h)]] < 0 and unknown[tail[prev_of(g)]] < 0):
+            angles += 1
     return lengths, angles
 
 
@@ -195,7 +195,7 @@ def _gather_active(
     rest = mesh.rest_positions
     areas = np.empty(len(alive))
     _rest_areas(rest, mesh.faces, areas)
-    l, a = 0, 0
+    i, a = 0, 0
     for h in range(len(twin)):
         g = twin[h]
         if not alive[h // 3] or 0 <= g < h:
@@ -204,9 +204,9 @@ def _gather_active(
         held = unknown[p1] < 0 and unknown[p2] < 0
         area = areas[h // 3] + (areas[g // 3] if g >= 0 else 0.0)
         if not held and rest_length[h] > 0.0:
-            ends[l, 0], ends[l, 1] = p1, p2
-            length[l], length_weight[l] = rest_length[h], area
-            l += 1
+            ends[i, 0], ends[i, 1] = p1, p2
+            length[i], length_weight[i] = rest_length[h], area
+            i += 1
         if g >= 0 and not math.isnan(start[h]) and span[h] > 0.0:
             p4 = tail[prev_of(g)]
             if not (held and unknown[p3] < 0 and unknown[p4] < 0):
@@ -215,7 +215,7 @@ def _gather_active(
                     target[a] = curved_bend(start[h], span[h], radius, share_grown(rate * (age - since[h])))
                 else:
                     target[a] = shrunk_bend(start[h], rate * (age - since[h]), floor)
-                angle_weight[a] = area * bending / (span[h] * span[h])
+                angle_weight[a] = 0.5 * area * bending / (span[h] * span[h])
                 hinge_edge[a] = h
                 bend_at_rest[a] = hinge_bend(rest, origin[p1], origin[p2], origin[p3], origin[p4])
                 a += 1
@@ -277,6 +277,31 @@ def _add_gradient(
 
 
 @kernel
+def _add_magnitudes(
+    positions: Vectors, unknown: Indices, ends: Indices, rest_length: Vectors, length_weight: Vectors,
+    hinges: Indices, target: Vectors, angle_weight: Vectors, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(ends)):
+        x, y, z = _difference(positions, ends[i, 1], ends[i, 0])
+        strain = math.sqrt(x * x + y * y + z * z) / rest_length[i] - 1.0
+        for k in range(2):
+            if unknown[ends[i, k]] >= 0:
+                out[unknown[ends[i, k]]] += abs(length_weight[i] * strain / rest_length[i])
+    for i in range(len(hinges)):
+        bend, ux, uy, uz, vx, vy, vz, s, t = hinge_gradient(
+            positions, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3]
+        )
+        moment = abs(angle_weight[i] * (bend - target[i]))
+        for k in range(4):
+            j = unknown[hinges[i, k]]
+            if j >= 0:
+                cu = -(1.0 - s) if k == 0 else (-s if k == 1 else (1.0 if k == 2 else 0.0))
+                cv = -(1.0 - t) if k == 0 else (-t if k == 1 else (0.0 if k == 2 else 1.0))
+                x, y, z = cu * ux + cv * vx, cu * uy + cv * vy, cu * uz + cv * vz
+                out[j] += moment * math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
 def _add_hessian_product(
     positions: Vectors, moving: Vectors, unknown: Indices, ends: Indices, rest_length: Vectors,
     length_weight: Vectors, hinges: Indices, target: Vectors, angle_weight: Vectors, out: Vectors,
@@ -316,7 +341,10 @@ def _add_hessian_product(
 def _hinge_gradient_change(
     positions: Vectors, moving: Vectors, p1: int, p2: int, p3: int, p4: int, g: Vectors, d: Vectors
 ) -> float:
-    """The gradient of the bend into g (4, 3), its change with the movement into d (4, 3); returns the bend."""
+    """The gradient of the bend into g (4, 3), its change with the movement into d (4, 3); returns the bend.
+
+    Zeros where a face or the edge has no extent.
+    """
     g[:], d[:] = 0.0, 0.0
     ex, ey, ez = _difference(positions, p2, p1)
     ax, ay, az = _difference(positions, p3, p1)
@@ -407,9 +435,7 @@ def _difference(points: Vectors, a: int, b: int) -> tuple[float, float, float]:
 
 
 @formula
-def _cross(
-    ax: float, ay: float, az: float, bx: float, by: float, bz: float
-) -> tuple[float, float, float]:
+def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 

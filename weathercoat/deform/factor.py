@@ -1,7 +1,8 @@
-"""Sparse factors of the islands' matrices: L D L' by QDLDL, which has no threads and calls no BLAS, so its bits
-are its own.
+"""Sparse factors of the islands' matrices: L D L' by QDLDL, which has no threads and calls no BLAS, so its
+bits are its own.
 
-Source: Stellato et al., OSQP: an operator splitting solver for quadratic programs, 2020 (QDLDL; ordering by AMD).
+Source: Stellato et al., OSQP: an operator splitting solver for quadratic programs, 2020 (QDLDL; ordering by
+AMD).
 """
 
 from __future__ import annotations
@@ -9,10 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.deform.blocks import Pattern
 from weathercoat.mesh.surface import Indices, Vectors
+
+Numbers = NDArray[np.integer]
 
 
 class Factors:
@@ -22,7 +26,7 @@ class Factors:
     factored; with other values later, it is factored in the same order.
     """
 
-    def __init__(self, pattern: Pattern, bounds: Indices, size: int) -> None:
+    def __init__(self, pattern: Pattern, bounds: Numbers, size: int) -> None:
         """For blocks of size x size."""
         self._size, self._bounds, self._pattern = size, bounds, pattern
         blocks = np.diff(pattern.start)
@@ -32,8 +36,11 @@ class Factors:
         _expand_rows(size, pattern.start, pattern.row, self._start, self._row)
         self._solvers: dict[int, Any] = {}
 
-    def factor(self, islands: Indices, blocks: Vectors) -> None:
-        """Factor the matrices of islands from all blocks (b, size, size); only upper triangles are read."""
+    def factor(self, islands: Numbers, blocks: Vectors) -> None:
+        """Factor the matrices of islands from all blocks (b, size, size); only upper triangles are read.
+
+        One that has no factors is remembered as such: its solutions are NaN.
+        """
         import qdldl
         from scipy.sparse import csc_matrix
 
@@ -46,28 +53,33 @@ class Factors:
                 (data[a:b], self._row[a:b] - first, self._start[first : last + 1] - a),
                 shape=(last - first, last - first),
             )
-            if i in self._solvers:
-                self._solvers[i].update(matrix, upper=True)
-            else:
-                self._solvers[i] = qdldl.Solver(matrix, upper=True)
+            try:
+                if self._solvers.get(i) is None:
+                    self._solvers[i] = qdldl.Solver(matrix, upper=True)
+                else:
+                    self._solvers[i].update(matrix, upper=True)
+            except RuntimeError:  # a pivot is 0
+                self._solvers[i] = None
 
     def is_positive(self, island: int) -> bool:
         """Whether the matrix of an island that has been factored is positive definite."""
-        return bool((self._solvers[island].factors()[1] > 0.0).all())
+        solver = self._solvers[island]
+        return solver is not None and bool((solver.factors()[1] > 0.0).all())
 
-    def solve(self, islands: Indices, right: Vectors) -> Vectors:
-        """Solve for the unknowns of islands that have been factored; right (v, size), zeros for the others."""
+    def solve(self, islands: Numbers, right: Vectors) -> Vectors:
+        """Solve for the unknowns of islands that have been factored; right (v, size), zeros elsewhere."""
         out = np.zeros_like(right)
         for i in islands.tolist():
             part = slice(self._bounds[i], self._bounds[i + 1])
-            out[part] = self._solvers[i].solve(right[part].reshape(-1)).reshape(-1, self._size)
+            solver = self._solvers[i]
+            out[part] = (
+                np.nan if solver is None else solver.solve(right[part].reshape(-1)).reshape(-1, self._size)
+            )
         return out
 
 
 @kernel
-def _expand_rows(
-    size: int, block_start: Indices, block_row: Indices, start: Indices, row: Indices
-) -> None:
+def _expand_rows(size: int, block_start: Indices, block_row: Indices, start: Indices, row: Indices) -> None:
     """The rows of scalar columns, `size` for each column of blocks; the upper triangle."""
     for j in range(len(block_start) - 1):
         for c in range(size):
@@ -79,9 +91,7 @@ def _expand_rows(
 
 
 @kernel
-def _expand_blocks(
-    size: int, block_start: Indices, start: Indices, blocks: Vectors, data: Vectors
-) -> None:
+def _expand_blocks(size: int, block_start: Indices, start: Indices, blocks: Vectors, data: Vectors) -> None:
     """The values of scalar columns from blocks."""
     for j in range(len(block_start) - 1):
         last = block_start[j + 1] - 1

@@ -37,10 +37,7 @@ _NEAR = 1e-2  # the gap below which all of the second derivative is tried
 def minimise_by_newton(
     elastic: Elastic, positions: Vectors, guess: Guess, *, iterations: int, tolerance: float
 ) -> Solved:
-    """Bring free vertices to a minimum of the energy, down to a gap (see `Solved`); changes positions (n, 3).
-
-    No step raises an island's energy.
-    """
+    """A `Minimise`."""
     e = elastic
     lift(e, positions)
     count = len(e.scale)
@@ -61,11 +58,13 @@ def minimise_by_newton(
         if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
             continue
         positions[:], value, share = search(e, positions, value, slope, direction, live)
-        live &= gap > tolerance
+        live &= ~(gap <= tolerance)
         if not live.any():
             break
         damping = np.clip(
-            np.where(share > 0.9, 0.2, np.where(share > 0.3, 1.0, 8.0)) * damping, _LEAST_DAMPING, _MOST_DAMPING
+            np.where(share > 0.9, 0.2, np.where(share > 0.3, 1.0, 8.0)) * damping,
+            _LEAST_DAMPING,
+            _MOST_DAMPING,
         )
         whole = live & (gap < _NEAR) & (share > 0.0)
     return Solved(done, float(gap.max(initial=0.0)), int(live.sum()))

@@ -21,8 +21,9 @@ from weathercoat.deform.angle import (
     meet_split_angle,
 )
 from weathercoat.deform.constraints import Constraints
-from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.descending import Solved
 from weathercoat.deform.length import meet_length
+from weathercoat.deform.parameters import Aim, DeformParameters
 from weathercoat.deform.substrate import depth_below
 from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
@@ -71,8 +72,8 @@ def find_active(mesh: HalfEdgeMesh, constraints: Constraints) -> Active:
 
 def deform_plainly(
     mesh: HalfEdgeMesh, constraints: Constraints, parameters: DeformParameters, age: float
-) -> None:
-    """What `deform` does, from the definition of what is active."""
+) -> Solved:
+    """What `deform` does with sweeps, from the definition of what is active."""
     active = find_active(mesh, constraints)
     target = bends_wanted(constraints, active.hinge_edges, parameters, age)
     form = FORMS[parameters.deformation_angle]
@@ -82,6 +83,7 @@ def deform_plainly(
         sweep_plainly(
             mesh, constraints.inverse_mass, active, form, target, parameters.deformation_angle_stiffness
         )
+    return Solved(parameters.deformation_sweeps, None, 0)
 
 
 def sweep_plainly(
@@ -97,26 +99,20 @@ def bends_wanted(
     constraints: Constraints, half_edges: Indices, parameters: DeformParameters, age: float
 ) -> Vectors:
     """The bends that the hinges of half-edges (k,) are to have at an age [rad], (k,)."""
-    p = parameters
     bends = np.empty(len(half_edges))
-    by_curvature = p.curl_rule == "curvature"
-    rate = p.curl_rate if by_curvature else p.curl_angle_rate
     start, since = constraints.angle_start[half_edges], constraints.angle_age[half_edges]
-    span = constraints.span[half_edges]
-    _bends_wanted(by_curvature, start, age - since, span, p.curl_radius, rate, p.curl_angle_floor, bends)
+    _bends_wanted(start, since, constraints.span[half_edges], parameters.aim_at(age), bends)
     return bends
 
 
 @kernel
-def _bends_wanted(
-    by_curvature: bool, start: Vectors, elapsed: Vectors, span: Vectors, radius: float, rate: float,
-    floor: float, out: Vectors,
-) -> None:  # fmt: skip
+def _bends_wanted(start: Vectors, since: Vectors, span: Vectors, aim: Aim, out: Vectors) -> None:
+    by_curvature, radius, rate, floor, age = aim.by_curvature, aim.radius, aim.rate, aim.floor, aim.age
     for i in range(len(out)):
         if by_curvature:
-            out[i] = curved_bend(start[i], span[i], radius, share_grown(rate * elapsed[i]))
+            out[i] = curved_bend(start[i], span[i], radius, share_grown(rate * (age - since[i])))
         else:
-            out[i] = shrunk_bend(start[i], rate * elapsed[i], floor)
+            out[i] = shrunk_bend(start[i], rate * (age - since[i]), floor)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """The second derivative of the energy: its pattern, which only the topology changes, and its blocks.
 
-Blocks of 3 x 3 for pairs of free vertices that share an edge or a hinge, the upper triangle by columns. Of each
-island either the Gauss-Newton part, which is never negative (of an edge k along its direction and
-k max(0, 1 - L / l) across it, of a hinge w g g' with g the gradient of its bend), or all of it.
+Blocks of 3 x 3 for pairs of free vertices that share an edge or a hinge, the upper triangle by columns. Of
+each island either the Gauss-Newton part, which is never negative (of an edge k along its direction and k
+max(0, 1 - L / l) across it, of a hinge w g g' with g the gradient of its bend), or all of it.
 
 Source of the hinge's second derivative: Tamstorf and Grinspun, Discrete bending forces and their Jacobians,
 2013; derived here by moving the foot of each apex and turning the edge.
@@ -20,7 +20,6 @@ from weathercoat.compile import kernel
 from weathercoat.deform.blocks import Pattern, find_blocks, make_pattern
 from weathercoat.deform.energy import Elastic, hinge_gradient
 from weathercoat.mesh.surface import Indices, Vectors
-
 
 _HELD = 1e6  # stiffness that holds a vertex on its plane, relative to its own
 
@@ -41,8 +40,8 @@ def find_places(elastic: Elastic) -> Places:
 
 
 def fill_blocks(elastic: Elastic, places: Places, positions: Vectors, whole: NDArray[np.bool_]) -> Vectors:
-    """The blocks (b, 3, 3) with film vertices at positions (n, 3); `whole` (k,) are the islands of which all is
-    wanted, not the Gauss-Newton part.
+    """The blocks (b, 3, 3) with film vertices at positions (n, 3); `whole` (k,) are the islands of which
+    all is wanted, not the Gauss-Newton part.
     """
     e = elastic
     blocks = np.zeros((len(places.pattern.row), 3, 3))
@@ -139,8 +138,8 @@ def hinge_second_derivative(
     (4, 3) and where the feet of the apexes lie along the edge; zeros where it has no extent.
 
     With a unit normal m, a unit edge d, the unit vector c from the edge to the apex at the height h:
-    moving the apex changes its gradient -m / h by U = (m c' + c m') / h^2; moving an end of the edge moves the
-    foot, the other way, and turns the edge, which adds W = d m' / (length h) with either sign.
+    moving the apex changes its gradient -m / h by U = (m c' + c m') / h^2; moving an end of the edge moves
+    the foot, the other way, and turns the edge, which adds W = d m' / (length h) with either sign.
     """
     out[:] = 0.0
     d, c = np.empty(3), np.empty(3)

@@ -1,10 +1,10 @@
 """A first guess for far curls: turn every face by what its hinges want, then fit the vertices.
 
-Descent along the energy creeps there, since lengths are so much stiffer than bends that a sheet can only curl
-from its edge inwards. Here the faces' rotations are found first, R_g = R_f Q for each hinge with Q the turn about
-its edge from rest to its target, in the least-squares sense over all nine entries and then brought back to
-rotations; after them the vertices, whose edges are to be those at rest, turned (a Poisson system). Exact for
-targets that can be met; where they cannot, a blend of what they want.
+Descent along the energy creeps there, since lengths are so much stiffer than bends that a sheet can only
+curl from its edge inwards. Here the faces' rotations are found first, R_g = R_f Q for each hinge with Q the
+turn about its edge from rest to its target, in the least-squares sense over all nine entries and then
+brought back to rotations; after them the vertices, whose edges are to be those at rest, turned (a Poisson
+system). Exact for targets that can be met; where they cannot, a blend of what they want.
 
 Source: in the spirit of Lipman et al., Linear rotation-invariant coordinates for meshes, 2005.
 """
@@ -23,15 +23,13 @@ from weathercoat.deform.factor import Factors
 from weathercoat.mesh.halfedge import HalfEdgeMesh
 from weathercoat.mesh.surface import Indices, Vectors
 
-_ANCHOR = 1e-9  # keeps where it is at rest what nothing holds, relative to its neighbours
+_ANCHOR = 1e-12  # keeps where it is at rest what nothing holds, relative to its neighbours
 _WHOLE = np.zeros(1, np.int64)
 
 
-def unroll(
-    mesh: HalfEdgeMesh, elastic: Elastic, positions: Vectors, islands: NDArray[np.bool_]
-) -> Vectors:
-    """The positions (n, 3) with the free vertices of some islands (k,) where the rotations of their faces want
-    them.
+def unroll(mesh: HalfEdgeMesh, elastic: Elastic, positions: Vectors, islands: NDArray[np.bool_]) -> Vectors:
+    """The positions (n, 3) with the free vertices of some islands (k,) where the rotations of their faces
+    want them.
     """
     e = elastic
     rest = mesh.rest_positions[mesh.origin[: len(positions)]]
@@ -112,11 +110,9 @@ def _add_turns(
                     right[c, g, r] += weight[i] * q[c, r]
 
 
-def _fit_vertices(
-    rest: Vectors, unknown: Indices, corners: Indices, turned: Vectors, count: int
-) -> Vectors:
-    """The `count` unknown vertices, the others at rest, whose edges fit best those of faces (f, 3) at rest, turned
-    by (f, 3, 3); edges count as much as the areas beside them.
+def _fit_vertices(rest: Vectors, unknown: Indices, corners: Indices, turned: Vectors, count: int) -> Vectors:
+    """The `count` unknown vertices, the others at rest, whose edges fit best those of faces (f, 3) at rest,
+    turned by (f, 3, 3); edges count as much as the areas beside them.
     """
     corners_unknown = unknown[corners]
     pattern = make_pattern(count, (corners_unknown,))

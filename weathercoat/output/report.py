@@ -24,7 +24,7 @@ from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT_VERSION = 1
-LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy", "numba", "qdldl")
 LARGEST_FLAKES = 20
 SIGNIFICANT_DIGITS = 12
 
@@ -39,12 +39,18 @@ PAPER_ROWS = {
 
 
 def measure_snapshot(
-    snapshot: Snapshot, *, flake_areas: ArrayLike = (), strain: float = 0.0, residual: float = 0.0
+    snapshot: Snapshot,
+    *,
+    flake_areas: ArrayLike = (),
+    strain: float = 0.0,
+    residual: float = 0.0,
+    energy: float = 0.0,
+    imbalance: float = 0.0,
 ) -> dict[str, Any]:
     """The figures of one snapshot.
 
-    flake_areas: rest area of every flake that has fallen so far; strain and residual: those of the
-    deformation, as the solver gives them. The result:
+    flake_areas: rest area of every flake that has fallen so far; the others: how far
+    the film is from its constraints and from balance, as the simulation gives them. The result:
 
     - separated_share: area of the film that has let go and not fallen, a face counting by its separated
     corners; - lost_area, lost_share: area of the film that has fallen; affected_share: the sum of both
@@ -52,7 +58,7 @@ def measure_snapshot(
     broken edge whose ends still hold together is not open and does not count. outline_length: length of the
     edges between film and lost film; - flakes: count, total, median and largest area, and the areas of the
     largest (at most 20); - film_rust, substrate_rust, dust: means by area, over the film that is left and
-    over the whole metal; - strain, residual.
+    over the whole metal; - strain, residual, energy, imbalance.
     """
     areas = face_areas(snapshot.substrate_vertices, snapshot.substrate_faces)
     total = float(areas.sum())
@@ -86,6 +92,8 @@ def measure_snapshot(
         "dust": _mean(snapshot.dust, snapshot.substrate_faces, areas),
         "strain": float(strain),
         "residual": float(residual),
+        "energy": float(energy),
+        "imbalance": float(imbalance),
     }
 
 
@@ -149,13 +157,15 @@ def make_report(
     meshes: Mapping[str, Mapping[str, Any]],
     notes: Iterable[Note],
     stopped: str,
+    solver: Mapping[str, Any],
     snapshots: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """The content of `run.json`.
 
     config: the resolved values; inputs: SHA-256 by file name, without folders, which differ from machine to
-    machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; stopped: why the run
-    ended; snapshots: the figures of each. Figures are rounded to 12 digits, the config is not.
+    machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; stopped: why the
+    run ended; solver: what it did in all steps; snapshots: the figures of each. Figures are rounded to 12
+    digits, the config is not.
     """
     return {
         "report_version": REPORT_VERSION,
@@ -166,6 +176,7 @@ def make_report(
         "meshes": _rounded(meshes),
         "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],
         "stopped": stopped,
+        "solver": _rounded(solver),
         "snapshots": _rounded(snapshots),
     }
 

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
-from weathercoat.deform.deformation import DeformParameters, Residual, deform, measure_residual
+from weathercoat.deform.deformation import deform
+from weathercoat.deform.descending import Solved
+from weathercoat.deform.parameters import DeformParameters
+from weathercoat.deform.residual import Residual, measure_residual
 from weathercoat.deform.sleep import Rest, make_rest
 from weathercoat.deform.team import Team
 from weathercoat.film.agenda import Agenda, make_agenda
@@ -39,12 +42,30 @@ _UP = np.array([0.0, 0.0, 1.0])  # in the simulation's frame
 
 
 @dataclass
+class Solving:
+    """What the solver of the deformation did in all steps: iterations or sweeps; the largest gap that it left
+    (see `deform.descending.Solved`), None where it knows none; steps that ended over their budget.
+    """
+
+    iterations: int = 0
+    largest_gap: float | None = None
+    unfinished_steps: int = 0
+
+    def add(self, solved: Solved) -> None:
+        """Count one step."""
+        self.iterations += solved.iterations
+        if solved.gap is not None:
+            self.largest_gap = max(self.largest_gap or 0.0, solved.gap)
+        self.unfinished_steps += solved.unfinished > 0
+
+
+@dataclass
 class Simulation:
     """The state of a run. All lengths inside are in sizes, in the frame of the shape.
 
     `surface` is the input in the order that the simulation uses; `team` are the threads that share a step;
-    `flake_areas` lists the rest areas, in square sizes, of all flakes that fell; `seconds` sums the time by
-    stage, in the rows of the paper's table.
+    `flake_areas` lists the rest areas, in square sizes, of all flakes that fell; `solving` sums what the
+    solver did, and `seconds` the time by stage, in the rows of the paper's table.
     """
 
     surface: Surface
@@ -65,6 +86,7 @@ class Simulation:
     seconds: dict[str, float] = field(
         default_factory=lambda: {"failure": 0.0, "deformation": 0.0, "stains": 0.0}
     )
+    solving: Solving = field(default_factory=Solving)
     team: Team = field(default_factory=Team)
     log: EventLog = field(init=False)
     rest: Rest = field(init=False)
@@ -104,7 +126,9 @@ class Simulation:
         follow_events(self.mesh, self.constraints, self.log)
         decided = time.perf_counter()
 
-        deform(self.mesh, self.constraints, self.deform_parameters, age, team=self.team, rest=self.rest)
+        self.solving.add(
+            deform(self.mesh, self.constraints, self.deform_parameters, age, team=self.team, rest=self.rest)
+        )
         deformed = time.perf_counter()
 
         rust_room.follow_events(self.mesh, self.rust, self.log, age)
