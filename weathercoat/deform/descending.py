@@ -90,7 +90,13 @@ def jump(elastic: Elastic, positions: Vectors, value: Vectors, far: Flags, guess
 
 
 def search(
-    elastic: Elastic, positions: Vectors, value: Vectors, slope: Vectors, direction: Vectors, live: Flags
+    elastic: Elastic,
+    positions: Vectors,
+    value: Vectors,
+    slope: Vectors,
+    direction: Vectors,
+    turn: Vectors,
+    live: Flags,
 ) -> tuple[Vectors, Vectors, Vectors]:
     """Go along a direction (v, 3) as far as each live island's energy falls enough, over the substrate.
 
@@ -100,9 +106,10 @@ def search(
     e = elastic
     live = live & np.isfinite(sum_islands(e, direction, direction))
     direction = np.where(live[e.island, None], direction, 0.0)
+    turn = np.where((live & np.isfinite(sum_islands(e, turn, turn)))[e.island, None], turn, 0.0)
     share = live.astype(np.float64)
     for _ in range(_TRIALS):
-        reached = _go(e, positions, direction, share)
+        reached = _go(e, positions, direction, turn, share)
         new = energy(e, reached)
         promised = sum_islands(e, slope, reached[e.free] - positions[e.free])
         searching = live & ~((new <= value + _ENOUGH * promised) & (promised < 0.0))
@@ -110,14 +117,15 @@ def search(
             return reached, new, share
         share = np.where(searching, _SHORTER * share, share)
     share = np.where(searching, 0.0, share)
-    reached = _go(e, positions, direction, share)
+    reached = _go(e, positions, direction, turn, share)
     return reached, energy(e, reached), share
 
 
-def _go(elastic: Elastic, positions: Vectors, direction: Vectors, share: Vectors) -> Vectors:
+def _go(elastic: Elastic, positions: Vectors, direction: Vectors, turn: Vectors, share: Vectors) -> Vectors:
     e = elastic
     reached = positions.copy()
-    reached[e.free] += share[e.island][:, None] * direction
+    along = share[e.island][:, None]
+    reached[e.free] += along * (direction + 0.5 * along * turn)
     lift(e, reached)
     return reached
 

@@ -32,8 +32,8 @@ from weathercoat.deform.factor import Factors
 from weathercoat.deform.stiffness import Places, fill_blocks, find_places, hold_and_damp
 from weathercoat.mesh.surface import Vectors
 
-_REMEMBERED = 6  # pairs; 3 need more iterations, 12 are not better
-_DAMPING = 1e-4  # of the mean of a diagonal block
+_REMEMBERED = 12  # pairs; 6 need an eighth more iterations
+_DAMPING = 1e-6  # of the mean of a diagonal block
 _LEAST_COSINE = 1e-9  # between a move and the change of the gradient over it, to remember them
 
 
@@ -59,7 +59,8 @@ def minimise_by_descent(
     pairs: deque[Pair] = deque(maxlen=_REMEMBERED)
     live, gap = np.ones(count, np.bool_), np.full(count, np.inf)
     value, slope = energy(e, positions), gradient(e, positions)
-    _prepare(e, places, factors, positions, slope)
+    _prepare(e, places, factors, positions, slope, live)
+    begun_anew = np.zeros(count, np.bool_)
     done = 0
     for done in range(1, iterations + 1):
         held = resting(e, positions, slope)
@@ -68,25 +69,35 @@ def minimise_by_descent(
         gap = np.where(live, -0.5 * sum_islands(e, free_slope, direction) / e.scale, gap)
         if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
             slope = gradient(e, positions)
-            _prepare(e, places, factors, positions, slope)
+            _prepare(e, places, factors, positions, slope, live)
             continue
         before, slope_before = positions[e.free], slope
-        positions[:], value, _ = search(e, positions, value, free_slope, direction, live)
+        positions[:], value, share = search(
+            e, positions, value, free_slope, direction, np.zeros_like(direction), live
+        )
         live &= ~(gap <= tolerance)
         if not live.any():
             break
         slope = gradient(e, positions)
-        pairs.append(_pair(e, positions[e.free] - before, slope - slope_before))
+        stuck = live & (share == 0.0)
+        if stuck.any():  # what is remembered misleads: begin anew from here
+            live &= ~(stuck & begun_anew)
+            pairs = deque([_forget(pair, stuck) for pair in pairs], _REMEMBERED)
+            _prepare(e, places, factors, positions, slope, live & stuck)
+        begun_anew = stuck
+        pairs.append(_forget(_pair(e, positions[e.free] - before, slope - slope_before), stuck))
     return Solved(done, float(gap.max(initial=0.0)), int(live.sum()))
 
 
-def _prepare(elastic: Elastic, places: Places, factors: Factors, positions: Vectors, slope: Vectors) -> None:
-    """Factor the matrix of all islands where they are."""
+def _prepare(
+    elastic: Elastic, places: Places, factors: Factors, positions: Vectors, slope: Vectors, islands: Flags
+) -> None:
+    """Factor the matrix of islands where they are."""
     e = elastic
     blocks = fill_blocks(e, places, positions, np.zeros(len(e.scale), np.bool_))
     damping = np.full(len(e.free), _DAMPING)
     hold_and_damp(blocks, places.pattern.diagonal(), e.normals, resting(e, positions, slope), damping)
-    factors.factor(np.arange(len(e.scale)), blocks)
+    factors.factor(np.flatnonzero(islands), blocks)
 
 
 def _downhill(elastic: Elastic, factors: Factors, pairs: deque[Pair], slope: Vectors, live: Flags) -> Vectors:
@@ -111,3 +122,8 @@ def _pair(elastic: Elastic, move: Vectors, change: Vectors) -> Pair:
     size = np.sqrt(sum_islands(e, move, move) * sum_islands(e, change, change))
     tells = product > _LEAST_COSINE * size
     return Pair(move, change, np.where(tells, 1.0 / np.where(tells, product, 1.0), 0.0))
+
+
+def _forget(pair: Pair, islands: Flags) -> Pair:
+    """The pair without what it tells of some islands."""
+    return pair._replace(over=np.where(islands, 0.0, pair.over))

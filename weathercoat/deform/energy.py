@@ -152,6 +152,20 @@ def hessian_product(elastic: Elastic, positions: Vectors, direction: Vectors) ->
     return out
 
 
+def bending_away(elastic: Elastic, positions: Vectors, direction: Vectors) -> Vectors:
+    """How the residuals (strains and bend errors) bend away from their first-order change along a direction
+    (v, 3): their second derivative along it, brought to the free vertices by their weighted gradients, (v, 3).
+    """
+    e = elastic
+    out = np.zeros((len(e.free), 3))
+    moving = np.zeros_like(positions)
+    moving[e.free] = direction
+    _add_bending_away(
+        positions, moving, e.unknown, e.ends, e.rest_length, e.length_weight, e.hinges, e.angle_weight, out
+    )
+    return out
+
+
 def sum_of_forces(elastic: Elastic, positions: Vectors) -> Vectors:
     """The magnitudes of all forces on each free vertex, (v,), whatever their directions."""
     e = elastic
@@ -335,6 +349,39 @@ def _add_hessian_product(
             if j >= 0:
                 for axis in range(3):
                     out[j, axis] += angle_weight[i] * (turning * g[k, axis] + error * d[k, axis])
+
+
+@kernel
+def _add_bending_away(
+    positions: Vectors, moving: Vectors, unknown: Indices, ends: Indices, rest_length: Vectors,
+    length_weight: Vectors, hinges: Indices, angle_weight: Vectors, out: Vectors,
+) -> None:  # fmt: skip
+    for i in range(len(ends)):
+        a, b = unknown[ends[i, 0]], unknown[ends[i, 1]]
+        x, y, z = _difference(positions, ends[i, 1], ends[i, 0])
+        dx, dy, dz = _difference(moving, ends[i, 1], ends[i, 0])
+        squared = x * x + y * y + z * z
+        if not squared > 0.0:
+            continue
+        along = x * dx + y * dy + z * dz
+        across = dx * dx + dy * dy + dz * dz - along * along / squared
+        force = length_weight[i] * across / (rest_length[i] * rest_length[i] * squared)
+        if a >= 0:
+            _add(out, a, -force, x, y, z)
+        if b >= 0:
+            _add(out, b, force, x, y, z)
+    g, d = np.empty((4, 3)), np.empty((4, 3))
+    for i in range(len(hinges)):
+        hinge = hinges[i]
+        _hinge_gradient_change(positions, moving, hinge[0], hinge[1], hinge[2], hinge[3], g, d)
+        second = 0.0
+        for k in range(4):
+            for axis in range(3):
+                second += d[k, axis] * moving[hinge[k], axis]
+        for k in range(4):
+            j = unknown[hinge[k]]
+            if j >= 0:
+                _add(out, j, angle_weight[i] * second, g[k, 0], g[k, 1], g[k, 2])
 
 
 @kernel

@@ -34,6 +34,7 @@ class Factors:
         self._start = np.concatenate([[0], np.cumsum(entries)])
         self._row = np.empty(self._start[-1], np.int64)
         _expand_rows(size, pattern.start, pattern.row, self._start, self._row)
+        self._matrices: dict[int, Any] = {}
         self._solvers: dict[int, Any] = {}
 
     def factor(self, islands: Numbers, blocks: Vectors) -> None:
@@ -42,17 +43,11 @@ class Factors:
         One that has no factors is remembered as such: its solutions are NaN.
         """
         import qdldl
-        from scipy.sparse import csc_matrix
 
         data = np.empty(len(self._row))
         _expand_blocks(self._size, self._pattern.start, self._start, blocks, data)
         for i in islands.tolist():
-            first, last = self._size * self._bounds[i], self._size * self._bounds[i + 1]
-            a, b = self._start[first], self._start[last]
-            matrix = csc_matrix(
-                (data[a:b], self._row[a:b] - first, self._start[first : last + 1] - a),
-                shape=(last - first, last - first),
-            )
+            matrix = self._matrix(i, data)
             try:
                 if self._solvers.get(i) is None:
                     self._solvers[i] = qdldl.Solver(matrix, upper=True)
@@ -60,6 +55,22 @@ class Factors:
                     self._solvers[i].update(matrix, upper=True)
             except RuntimeError:  # a pivot is 0
                 self._solvers[i] = None
+
+    def _matrix(self, island: int, data: Vectors) -> Any:
+        """The upper triangle of an island, from the values of all; one object, since its checks take long."""
+        from scipy.sparse import csc_matrix
+
+        first, last = self._size * self._bounds[island], self._size * self._bounds[island + 1]
+        begin, end = self._start[first], self._start[last]
+        if island not in self._matrices:
+            rows, starts = self._row[begin:end] - first, self._start[first : last + 1] - begin
+            self._matrices[island] = csc_matrix(
+                (data[begin:end], rows.astype(np.int32), starts.astype(np.int32)),
+                shape=(last - first, last - first),
+            )
+        else:
+            self._matrices[island].data[:] = data[begin:end]
+        return self._matrices[island]
 
     def is_positive(self, island: int) -> bool:
         """Whether the matrix of an island that has been factored is positive definite."""

@@ -25,12 +25,12 @@ from weathercoat.deform.descending import (
     slide,
     sum_islands,
 )
-from weathercoat.deform.energy import Elastic, energy, gradient
+from weathercoat.deform.energy import Elastic, bending_away, energy, gradient
 from weathercoat.deform.factor import Factors
 from weathercoat.deform.stiffness import Places, fill_blocks, find_places, hold_and_damp
 from weathercoat.mesh.surface import Vectors
 
-_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-12, 1e3  # of the mean of a diagonal block
+_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-9, 1e-14, 1e3  # of the mean of a diagonal block
 _NEAR = 1e-2  # the gap below which all of the second derivative is tried
 
 
@@ -57,7 +57,9 @@ def minimise_by_newton(
         gap = np.where(live, -0.5 * sum_islands(e, slope, direction) / e.scale, gap)
         if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
             continue
-        positions[:], value, share = search(e, positions, value, slope, direction, live)
+        away = slide(e, bending_away(e, positions, direction), held)
+        turn = slide(e, -factors.solve(np.flatnonzero(live), away), held)
+        positions[:], value, share = search(e, positions, value, slope, direction, turn, live)
         live &= ~(gap <= tolerance)
         if not live.any():
             break
