@@ -312,7 +312,7 @@ class Deformation(Section):
         lt=1,
     )
     film_thickness: Real = parameter(
-        1e-3,
+        2e-3,
         "With descent and newton: thickness of the film; it bends against stretching as its square to 12",
         unit="sizes",
         ge=1e-6,

@@ -154,7 +154,8 @@ def hessian_product(elastic: Elastic, positions: Vectors, direction: Vectors) ->
 
 def bending_away(elastic: Elastic, positions: Vectors, direction: Vectors) -> Vectors:
     """How the residuals (strains and bend errors) bend away from their first-order change along a direction
-    (v, 3): their second derivative along it, brought to the free vertices by their weighted gradients, (v, 3).
+    (v, 3): their second derivative along it, brought to the free vertices by their weighted gradients, (v,
+    3).
     """
     e = elastic
     out = np.zeros((len(e.free), 3))

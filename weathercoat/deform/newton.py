@@ -3,10 +3,12 @@
 Each island has a damping and an end of its own. The first steps are Gauss-Newton, whose matrix is never
 negative; near the minimum all of the second derivative is used, where it is positive definite, so that
 convergence becomes quadratic also for targets that cannot be met. Film that lies on the substrate and is
-pressed against it only slides in that step.
+pressed against it only slides in that step. A step also follows the curve that lengths force on it, by its
+second-order correction.
 
 Sources: Marquardt, An algorithm for least-squares estimation of nonlinear parameters, 1963; Bertsekas,
-Projected Newton methods for optimization problems with simple constraints, 1982.
+Projected Newton methods for optimization problems with simple constraints, 1982; Transtrum and Sethna,
+Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization, 2012.
 """
 
 from __future__ import annotations

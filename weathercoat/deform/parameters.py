@@ -36,7 +36,7 @@ class DeformParameters:
     deformation_sleep_tolerance: float = 0.0
     deformation_iterations: int = 50
     deformation_tolerance: float = 1e-3
-    deformation_film_thickness: float = 1e-3
+    deformation_film_thickness: float = 2e-3
 
     def aim_at(self, age: float) -> Aim:
         """The targets of an age."""
