@@ -16,7 +16,7 @@ _ENOUGH = 1e-4  # least share of the decrease that the slope promises
 _SHORTER = 0.4
 _TRIALS = 14
 
-FAR = 0.1  # the gap above which a guess is tried
+_FAR, _FLAT = 0.1, 0.9  # a gap, or an energy over that at rest, above which a guess is tried
 
 Flags = NDArray[np.bool_]
 Guess = Callable[[Flags], Vectors]
@@ -70,6 +70,15 @@ def slide(elastic: Elastic, vectors: Vectors, held: Flags) -> Vectors:
 def sum_islands(elastic: Elastic, a: Vectors, b: Vectors) -> Vectors:
     """The scalar products of two fields (v, 3), for each island (k,)."""
     return np.bincount(elastic.island, _dot(a, b), len(elastic.scale)).astype(np.float64, copy=False)
+
+
+def find_far(elastic: Elastic, gap: Vectors, value: Vectors, live: Flags) -> Flags:
+    """The live islands (k,) for which a guess is worth its price, from their gaps and energies (k,).
+
+    The gap alone does not tell: on some meshes the first step from flat promises little, since lengths hold
+    it back.
+    """
+    return live & ((gap > _FAR) | (value > _FLAT * elastic.scale))
 
 
 def jump(elastic: Elastic, positions: Vectors, value: Vectors, far: Flags, guess: Guess) -> bool:

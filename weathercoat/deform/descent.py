@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from weathercoat.deform.descending import (
-    FAR,
     Flags,
     Guess,
     Solved,
+    find_far,
     jump,
     lift,
     resting,
@@ -67,7 +67,7 @@ def minimise_by_descent(
         free_slope = slide(e, slope, held)
         direction = slide(e, _downhill(e, factors, pairs, free_slope, live), held)
         gap = np.where(live, -0.5 * sum_islands(e, free_slope, direction) / e.scale, gap)
-        if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
+        if done == 1 and jump(e, positions, value, find_far(e, gap, value, live), guess):
             slope = gradient(e, positions)
             _prepare(e, places, factors, positions, slope, live)
             continue

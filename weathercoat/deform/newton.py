@@ -16,10 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from weathercoat.deform.descending import (
-    FAR,
     Flags,
     Guess,
     Solved,
+    find_far,
     jump,
     lift,
     resting,
@@ -57,7 +57,7 @@ def minimise_by_newton(
         _factor(e, places, factors, positions, damping, held, live, whole)
         direction = slide(e, -factors.solve(np.flatnonzero(live), slope), held)
         gap = np.where(live, -0.5 * sum_islands(e, slope, direction) / e.scale, gap)
-        if done == 1 and jump(e, positions, value, live & (gap > FAR), guess):
+        if done == 1 and jump(e, positions, value, find_far(e, gap, value, live), guess):
             continue
         away = slide(e, bending_away(e, positions, direction), held)
         turn = slide(e, -factors.solve(np.flatnonzero(live), away), held)
