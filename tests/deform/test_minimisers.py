@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests import zoo
 from tests.deform.folds import STILL, clamped, polygon
 from tests.deform.test_energy import cracked_film
 from tests.sim.runs import assert_invariants, failed_shares, make_run, snapshot_bytes
+from tests.zoo import make_mesh
+from weathercoat.deform.constraints import make_constraints, release
 from weathercoat.deform.deformation import deform
 from weathercoat.deform.descending import Minimise, lift, resting
 from weathercoat.deform.descent import minimise_by_descent
@@ -60,6 +63,20 @@ def test_the_guess_leaves_other_islands_alone() -> None:
     moved = np.flatnonzero((guessed != positions).any(axis=1))
     assert len(moved) > 0 and set(moved) <= set(elastic.free[elastic.island == 0])
     assert np.isfinite(guessed).all()
+
+
+def test_film_without_hinges_has_nothing_to_guess() -> None:
+    """A triangle that hangs by one corner, and one that nothing holds."""
+    for freed in ([1, 2], [0, 1, 2]):
+        mesh = make_mesh(zoo.make_triangle())
+        constraints = make_constraints(mesh)
+        release(mesh, constraints, np.array(freed, np.int32), 0.0)
+        mesh.positions[:3, 2] += [0.0, 0.3, 0.1] if len(freed) == 2 else 0.0
+        for solver in MINIMISERS:
+            parameters = DeformParameters(deformation_solver=solver)
+            deform(mesh, constraints, parameters, 0.5)
+            lengths = np.linalg.norm(mesh.positions[[1, 2, 0]] - mesh.positions[:3], axis=1)
+            assert np.abs(lengths - 1.0).max() < 1e-3
 
 
 # --- known minima ---

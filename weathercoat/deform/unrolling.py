@@ -34,6 +34,8 @@ def unroll(mesh: HalfEdgeMesh, elastic: Elastic, positions: Vectors, islands: ND
     e = elastic
     rest = mesh.rest_positions[mesh.origin[: len(positions)]]
     chosen = islands[e.angle_island]
+    if not chosen.any():
+        return positions.copy()
     first = e.hinge_edge[chosen]
     pairs = np.stack([first // 3, mesh.twin[first] // 3], axis=1)
     corners = mesh.tail.reshape(-1, 3)
