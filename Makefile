@@ -12,7 +12,7 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all lint docs bench venv dev clean
+.PHONY: help demo test test-all lint docs bench charts venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
@@ -20,6 +20,7 @@ help:
 	@echo "make lint      style, types and import contracts"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
 	@echo "make bench     time it, and put the figures into the documentation"
+	@echo "make charts    measure accuracy and stability, and put the charts into the documentation"
 	@echo "make clean     remove the environment, the demo and the caches"
 
 venv: .venv/run-$(FINGERPRINT)
@@ -66,6 +67,16 @@ bench: .venv/bench-$(FINGERPRINT)
 	@mkdir -p build
 	$(BIN)/weathercoat bench speed $(PAPER_MESHES) -o build/bench --overwrite
 	$(BIN)/python docs/make.py speed --results build/bench
+
+# Every benchmark that ends in charts of its own; each keeps its results in docs/ and fills its page.
+CHARTS := accuracy stability
+
+charts: .venv/bench-$(FINGERPRINT)
+	@mkdir -p build
+	for name in $(CHARTS); do \
+		$(BIN)/weathercoat bench $$name -o build/$$name --overwrite && \
+		$(BIN)/python docs/make.py $$name --results build/$$name || exit 1; \
+	done
 
 clean:
 	rm -rf .venv $(DEMO) build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

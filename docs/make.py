@@ -9,6 +9,9 @@
     python docs/make.py first               the picture of the README
     python docs/make.py speed --results FOLDER
                                             performance.md with what `weathercoat bench speed -o FOLDER` wrote
+    python docs/make.py accuracy --results FOLDER
+    python docs/make.py stability --results FOLDER
+                                            accuracy.md and stability.md, likewise
 
 The pictures come from the tool as it is shipped and from generated parts, so anyone can make them again.
 """
@@ -18,9 +21,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from making import effects, gallery, pages, speed
+from making import accuracy, effects, gallery, pages, speed, stability
 
 PARTS = ("pages", "effects", "comparison", "gallery", "first")
+RESULTS = {
+    "speed": speed.take_results,
+    "accuracy": accuracy.take_results,
+    "stability": stability.take_results,
+}
 
 
 def main() -> None:
@@ -31,14 +39,14 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS) + "; all by default")
     parser.add_argument("--key", action="append", help="effects: only this parameter; may be given again")
     parser.add_argument("--config", action="append", help="gallery: only this config; may be given again")
-    parser.add_argument("--results", type=Path, metavar="FOLDER", help="speed: the results to take")
+    parser.add_argument("--results", type=Path, metavar="FOLDER", help=f"{', '.join(RESULTS)}: what to take")
     wanted = parser.parse_args()
     parts = wanted.parts or PARTS
     for part in parts:
-        if part not in (*PARTS, "speed"):
-            parser.error(f"no part {part!r}; there are {', '.join(PARTS)}, speed")
-    if ("speed" in parts) != (wanted.results is not None):
-        parser.error("speed takes --results FOLDER")
+        if part not in (*PARTS, *RESULTS):
+            parser.error(f"no part {part!r}; there are {', '.join((*PARTS, *RESULTS))}")
+    if any(part in RESULTS for part in parts) != (wanted.results is not None):
+        parser.error(f"{', '.join(RESULTS)} take --results FOLDER")
     if "pages" in parts:
         pages.write_pages()
     if "effects" in parts:
@@ -49,8 +57,9 @@ def main() -> None:
         gallery.draw_gallery(wanted.config)
     if "first" in parts:
         gallery.draw_first()
-    if "speed" in parts:
-        speed.take_results(wanted.results)
+    for part in parts:
+        if part in RESULTS:
+            RESULTS[part](wanted.results)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterator
 
 import weathercoat
-from making import effects, gallery, speed
+from making import accuracy, effects, gallery, speed, stability
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
@@ -269,6 +269,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "errors.md": errors_page,
     "gallery.md": gallery_page,
     "performance.md": speed.performance_page,
+    "accuracy.md": accuracy.accuracy_page,
+    "stability.md": stability.stability_page,
     "python.md": python_page,
 }
 

@@ -15,12 +15,12 @@ def stage_table(results: dict[str, Any]) -> Table:
     """Seconds for 1,000 steps by stage, each with the paper's below it where it has such a mesh."""
     table = [["", "faces", *STAGES, "total", "CPU", "times faster"]]
     for case in results["cases"]:
-        stages = [_digits(case["seconds"][name]) for name in (*STAGES, "total")]
+        stages = [digits(case["seconds"][name]) for name in (*STAGES, "total")]
         paper = case["paper"]
         faster = f"{paper['times_faster']:.1f}" if paper else ""
-        table.append([case["label"], f"{case['faces']:,}", *stages, _digits(case["cpu_seconds"]), faster])
+        table.append([case["label"], f"{case['faces']:,}", *stages, digits(case["cpu_seconds"]), faster])
         if paper:
-            theirs = [_digits(paper["seconds"][name]) for name in (*STAGES, "total")]
+            theirs = [digits(paper["seconds"][name]) for name in (*STAGES, "total")]
             table.append([f"paper: {paper['name']}", f"{paper['faces']:,}", *theirs, "", ""])
     exponents = results["growth"]["exponents"]
     if exponents["total"] is not None:
@@ -52,12 +52,12 @@ def step_table(results: dict[str, Any]) -> Table:
         table.append(
             [
                 case["label"],
-                _digits(case["step_ms"]),
-                _digits(case["step_ms_at_end"]),
-                f"{_digits(speed[0])} to {_digits(min(speed))}",
-                _digits(sweep["ms"]),
-                _digits(sweep["floor_ms"]),
-                _digits(sweep["plain_ms"]),
+                digits(case["step_ms"]),
+                digits(case["step_ms_at_end"]),
+                f"{digits(speed[0])} to {digits(min(speed))}",
+                digits(sweep["ms"]),
+                digits(sweep["floor_ms"]),
+                digits(sweep["plain_ms"]),
                 f"{sweep['times_plain']:.1f}",
                 f"{sweep['lengths']:,}",
                 f"{sweep['angles']:,}",
@@ -75,7 +75,7 @@ def peer_table(results: dict[str, Any]) -> Table:
         if case["peer"]:
             sweep, peer = case["sweep"], case["peer"]
             counts = [f"{sweep['lengths']:,}", f"{sweep['angles']:,}"]
-            row = [case["label"], *counts, _digits(sweep["ms"]), _digits(peer["ms"])]
+            row = [case["label"], *counts, digits(sweep["ms"]), digits(peer["ms"])]
             table.append([*row, f"{peer['times_ours']:.1f}"])
     return table
 
@@ -88,8 +88,8 @@ def variant_table(results: dict[str, Any]) -> Table:
         if case["variant_of"]:
             base, gap = by_label[case["variant_of"]], case["apart"]
             faster = [f"{base[name] / case[name]:.2f}" for name in ("step_ms", "step_ms_at_end")]
-            gaps = [_digits(gap[name]) for name in ("rms", "percentile_99", "largest")]
-            times = [_digits(case[name]) for name in ("step_ms", "step_ms_at_end")]
+            gaps = [digits(gap[name]) for name in ("rms", "percentile_99", "largest")]
+            times = [digits(case[name]) for name in ("step_ms", "step_ms_at_end")]
             table.append([case["label"], *times, *faster, *gaps])
     return table
 
@@ -115,15 +115,21 @@ def machine_lines(results: dict[str, Any]) -> list[str]:
     """The machine, its versions, and what it can do at most."""
     machine = results["machine"]
     warm_up = machine["warm_up"]
-    versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
     compiled = warm_up["compiled_kernels"]
     what = f"compiling {compiled} kernels" if compiled else "loading the compiled kernels"
     return [
-        f"{machine['cpu']}, {machine['cores']} cores, {machine['system']}, {machine['date']}",
-        versions,
+        *describe_lines(machine),
         f"One core copies {machine['copy_bandwidth'] / 1e9:.1f} GB/s (read and written) and does"
         f" {machine['arithmetic_peak'] / 1e9:.1f} GFlop/s in a vectorised kernel.",
         f"The first run of all, {what} included, took {warm_up['seconds']:.1f} s.",
+    ]
+
+
+def describe_lines(machine: dict[str, Any]) -> list[str]:
+    """The machine with the date, and the versions."""
+    return [
+        f"{machine['cpu']}, {machine['cores']} cores, {machine['system']}, {machine['date']}",
+        ", ".join(f"{name} {number}" for name, number in machine["versions"].items()),
     ]
 
 
@@ -140,11 +146,16 @@ def as_text(results: dict[str, Any]) -> Iterator[str]:
     for title, make in titles.items():
         table = make(results)
         if len(table) > 1:
-            widths = [max(map(len, column)) for column in zip(*table, strict=True)]
             yield from ("", title)
-            for row in table:
-                first, *others = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-                yield f"{first.strip():{widths[0]}}  " + "  ".join(others)
+            yield from as_lines(table)
+
+
+def as_lines(table: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A table for a terminal, its first column to the left and the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        first, *others = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        yield f"{first.strip():{widths[0]}}  " + "  ".join(others)
 
 
 def as_markdown(table: Sequence[Sequence[str]]) -> str:
@@ -178,6 +189,6 @@ def _csv_row(case: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _digits(value: float) -> str:
+def digits(value: float) -> str:
     """Three significant digits, and of large numbers all before the point."""
     return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"

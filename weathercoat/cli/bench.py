@@ -84,6 +84,61 @@ def speed(
     _print(results, as_text, output, quiet=quiet, as_json=as_json)
 
 
+@command.command("accuracy")
+@click.argument("cases", metavar="[CASE]...", nargs=-1)
+@options.output("Folder for accuracy.json, accuracy.csv and the charts; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def accuracy(
+    cases: tuple[str, ...], output: Path | None, overwrite: bool, quiet: bool, as_json: bool
+) -> None:
+    """Measure work against precision on films whose deformed shape is known, or on the CASEs named.
+
+    Each solver and form of the angle constraint starts from flat film with larger and larger budgets. Times
+    are CPU milliseconds, set-up and factorisation included.
+    """
+    from weathercoat.bench.accuracy import bench_accuracy
+    from weathercoat.bench.accuracy_chart import case_charts
+    from weathercoat.bench.accuracy_tables import as_csv, as_text
+
+    folder = _results_folder("accuracy", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_accuracy(cases, progress=messages.progress, say=messages.log)
+        if folder is not None:
+            _write(folder, "accuracy", results, as_csv(results), case_charts(results), messages.log)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
+@command.command("stability")
+@click.argument("maps", metavar="[MAP]...", nargs=-1)
+@options.output("Folder for stability.json, stability.csv and the charts; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def stability(
+    maps: tuple[str, ...], output: Path | None, overwrite: bool, quiet: bool, as_json: bool
+) -> None:
+    """Try every solver and form of the angle constraint where methods fail, on all maps or the MAPs named.
+
+    Maps are curl per step and shape of triangles, budget and length of flaps, folds up to a full turn,
+    degenerate elements, unit and place of the model, and parameters at their bounds and beyond. Each cell is
+    converged, slow, oscillating, flipped, different, non-finite or refused.
+    """
+    from weathercoat.bench.stability import bench_stability
+    from weathercoat.bench.stability_chart import map_charts
+    from weathercoat.bench.stability_tables import as_csv, as_text
+
+    folder = _results_folder("stability", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_stability(maps, progress=messages.progress, say=messages.log)
+        if folder is not None:
+            _write(folder, "stability", results, as_csv(results), map_charts(results), messages.log)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
 def _results_folder(name: str, output: Path | None, *, overwrite: bool) -> RunFolder | None:
     """The folder for a benchmark's results, refused before any work where it cannot be written."""
     from weathercoat.output.folder import RunFolder

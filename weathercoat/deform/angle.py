@@ -8,8 +8,8 @@ phi_0 - pi [rad]. At least one of its vertices has an inverse mass.
   difference to third order, and is clamped to 1, so that no correction turns a face by more than about a
   radian.
 - `meet_split_angle`: the paper's form (4.3). Each face is turned about the edge until it makes half the
-  outer dihedral with the neutral direction n = (n1 + n2) / |n1 + n2|, which is held constant. Degenerates
-  where n1 = -n2.
+  outer dihedral with the neutral direction n = (n1 + n2) / |n1 + n2|, which is held constant. Where
+  n1 = -n2 that has no direction; such a hinge is taken for a valley or a ridge as its target is.
 - `meet_arccos_angle`: C = arccos(-n1 . n2) - phi_0 (Mueller et al., 2007). It cannot tell a ridge from a
   valley, and has no gradient where the hinge is flat: such hinges stay.
 """
@@ -112,9 +112,13 @@ def meet_split_angle(
         return
     ax, ay, az = mx + nx, my + ny, mz + nz
     a_norm = math.sqrt(ax * ax + ay * ay + az * az)
-    if not a_norm > 1e-9:
-        return
-    ax, ay, az = ax / a_norm, ay / a_norm, az / a_norm
+    if a_norm > 1e-9:
+        ax, ay, az = ax / a_norm, ay / a_norm, az / a_norm
+    else:
+        # the faces lie on each other, as a valley or as a ridge: whichever is wanted
+        ex, ey, ez, _ = _edge(positions, p1, p2)
+        side = 1.0 if target < 0.0 else -1.0
+        ax, ay, az = side * (my * ez - mz * ey), side * (mz * ex - mx * ez), side * (mx * ey - my * ex)
     half = 0.5 * (math.pi + target)
     reach = min(m_norm, n_norm) / length
     _turn_face(positions, p1, p2, p3, w1, w2, w3, ax, ay, az, half, reach, stiffness)

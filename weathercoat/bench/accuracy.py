@@ -1,0 +1,227 @@
+"""The accuracy benchmark: work against precision, for every solver and form of the angle constraint."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any
+
+from weathercoat.bench.machine import describe_machine
+from weathercoat.bench.reference import Errors, ReferenceCase, measure_errors
+from weathercoat.bench.reference_cases import make_flap, make_reference_cases
+from weathercoat.deform.deformation import deform
+from weathercoat.errors import UsageError
+
+SWEEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000)
+_SECONDS = 1.0  # CPU time for each so many faces, after which a ladder has no further rung
+_FACES, _MOST_SECONDS = 3_000, 5.0
+_SHORT, _REPEATS = 0.02, 3  # CPU seconds below which a rung is timed so many times
+_LAST, _STALLED = 2, 0.9  # so many last rungs that leave more than this share of the error gained nothing
+ERRORS = ("position", "angle", "length")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How a method is used: the share of an angle correction, in how many steps the targets grow, and whether
+    it begins a thousandth of the way to the answer instead of flat.
+    """
+
+    stiffness: float = 1.0
+    steps: int = 1
+    nudged: bool = False
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        steps = f"{self.steps} step{'s' if self.steps > 1 else ''}"
+        return f"stiffness {self.stiffness:g}, {steps}" + (", nudged" if self.nudged else "")
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to deform: a solver with a form of the angle constraint, the budgets a step that are tried, and
+    the settings.
+    """
+
+    label: str
+    values: dict[str, Any]  # keys of the config, dotted
+    budget: str  # the key that the budget goes to
+    budgets: tuple[int, ...]
+    settings: tuple[Setting, ...]
+    goes_on: bool = False  # a step of a + b is a step of a and one of b
+
+
+_SWEEP_SETTINGS = (Setting(), Setting(stiffness=0.3), Setting(steps=20))
+
+
+def _sweeps(form: str, settings: tuple[Setting, ...]) -> Method:
+    values = {"deformation.angle": form}
+    return Method(f"sweeps, {form}", values, "deformation.sweeps", SWEEPS, settings, goes_on=True)
+
+
+METHODS = (
+    _sweeps("dihedral", _SWEEP_SETTINGS),
+    _sweeps("split", _SWEEP_SETTINGS),
+    _sweeps("arccos", (Setting(), Setting(nudged=True))),  # what is flat has no gradient in this form
+)
+
+
+def bench_accuracy(
+    names: Sequence[str] = (),
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    say: Callable[[str], None] = lambda line: None,
+) -> dict[str, Any]:
+    """The curves of all methods on the cases, or on those named, as plain values.
+
+    progress: called with the ladders done and their number. say: called with what is worth knowing, a line
+    each. Raises UsageError for an unknown name.
+    """
+    known = make_reference_cases()
+    for name in names:
+        if name not in known:
+            raise UsageError(f"no case {name!r}", remedy=f"there are {', '.join(known)}")
+    say("compiling where that has not been done yet")
+    warm_up(METHODS)
+    makers = make_reference_cases(names)
+    total = len(makers) * sum(len(method.settings) for method in METHODS)
+    done = 0
+    found = []
+    for make in makers.values():
+        case = make()
+        if case.answer is None:
+            continue
+        say(f"{case.name}: {case.about}")
+        curves = []
+        for method in METHODS:
+            ladders = []
+            for setting in method.settings:
+                points = list(climb(case, method, setting)) if is_usable(case, setting) else []
+                if points:
+                    ladders.append({"setting": setting.label, **asdict(setting), "points": points})
+                done += 1
+                progress(done, total)
+            curves.append({"method": method.label, "ladders": ladders, **summarise(ladders)})
+        found.append(describe_case(case) | {"curves": curves})
+    return {"schema": 1, "machine": describe_machine(), "cases": found}
+
+
+def describe_case(case: ReferenceCase) -> dict[str, Any]:
+    """What a case is, as plain values."""
+    assert case.answer is not None
+    return {
+        "name": case.name,
+        "about": case.about,
+        "faces": case.faces,
+        "free_vertices": len(case.active.free),
+        "answer": case.answer.kind,
+        "start": asdict(measure_errors(case, case.start)),
+    }
+
+
+def is_usable(case: ReferenceCase, setting: Setting) -> bool:
+    """Whether the case can be run so: the targets of frozen film are what they are."""
+    return setting.steps == 1 or case.can_grow
+
+
+def climb(case: ReferenceCase, method: Method, setting: Setting) -> Iterator[dict[str, Any]]:
+    """The points of a ladder: budget a step, CPU milliseconds of all steps, and errors at the end."""
+    assert case.answer is not None
+    enough = min(_SECONDS * max(1.0, case.faces / _FACES), _MOST_SECONDS)
+    start = case.start + 1e-3 * (case.answer.positions - case.start) if setting.nudged else case.start
+    mesh, behind, so_far, spent = case.mesh_at(start), 0, 0.0, 0.0
+    most = max(method.budgets)  # of all steps
+    for budget in (budget for budget in method.budgets if budget * setting.steps <= most):
+        if method.goes_on and setting.steps == 1:
+            so_far += _run(case, mesh, method, setting, budget - behind)
+            behind, work = budget, so_far
+            spent = so_far
+        else:
+            trials: list[float] = []
+            for _ in range(_REPEATS):
+                mesh = case.mesh_at(start)
+                trials.append(_run(case, mesh, method, setting, budget))
+                if trials[0] > _SHORT:
+                    break
+            work = median(trials)
+            spent += sum(trials)
+        errors = measure_errors(case, mesh.positions[: mesh.vertex_count])
+        yield {"budget": budget, "cpu_ms": 1e3 * work, **_plain(errors)}
+        if spent > enough or not math.isfinite(errors.angle):
+            return
+
+
+def _run(case: ReferenceCase, mesh: Any, method: Method, setting: Setting, budget: int) -> float:
+    """CPU seconds of all steps of a case with a budget each; changes the positions of the mesh."""
+    given = {**method.values, "deformation.angle_stiffness": setting.stiffness, method.budget: budget}
+    parameters = case.parameters_with(given)
+    spent = 0.0
+    for step in range(setting.steps):
+        if case.can_grow:
+            case.aim((step + 1) / setting.steps)
+        started = time.process_time()
+        deform(mesh, case.constraints, parameters, case.age)
+        spent += time.process_time() - started
+    return spent
+
+
+def summarise(ladders: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """What a method comes to over its settings: for each error the front of its points, and where it stops.
+
+    The front is the points that no other one beats in both work and error. `stops`: whether the last rungs of
+    the ladder that went lowest gained nothing any more.
+    """
+    return {error: _summarise(ladders, error) for error in ERRORS}
+
+
+def _summarise(ladders: Sequence[dict[str, Any]], error: str) -> dict[str, Any]:
+    points = [
+        {
+            "cpu_ms": point["cpu_ms"],
+            "error": point[error],
+            "setting": ladder["setting"],
+            "budget": point["budget"],
+        }
+        for ladder in ladders
+        for point in ladder["points"]
+        if point[error] is not None
+    ]
+    if not points:
+        return {"front": [], "least": None, "setting": None, "stops": True}
+    front: list[dict[str, Any]] = []
+    for point in sorted(points, key=lambda point: (point["cpu_ms"], point["error"])):
+        if not front or point["error"] < front[-1]["error"]:
+            front.append(point)
+    lowest = front[-1]
+    (climbed,) = (ladder["points"] for ladder in ladders if ladder["setting"] == lowest["setting"])
+    return {
+        "front": front,
+        "least": lowest["error"],
+        "setting": lowest["setting"],
+        "stops": has_stopped([point[error] for point in climbed]),
+    }
+
+
+def has_stopped(errors: Sequence[float | None]) -> bool:
+    """Whether the last of the errors along a ladder, None for not finite, improve on those before by nothing
+    worth having.
+    """
+    known = [math.inf if error is None else error for error in errors]
+    if len(known) < 2 + _LAST:
+        return False
+    return min(known[-_LAST:]) > _STALLED * min(known[:-_LAST])
+
+
+def _plain(errors: Errors) -> dict[str, float | None]:
+    """Errors as JSON has them: None for what is not finite."""
+    return {name: value if math.isfinite(value) else None for name, value in asdict(errors).items()}
+
+
+def warm_up(methods: Sequence[Method]) -> None:
+    """Run every method once on a small film, so that it is compiled."""
+    case = make_flap(4)
+    for method in methods:
+        _run(case, case.mesh_at(case.start), method, Setting(), 2)
