@@ -63,7 +63,7 @@ def test_the_front_drops_what_another_beats_in_work_and_error() -> None:
         {"setting": "b", "points": [point(3.0, 0.05), point(8.0, None)]},
     ]
     found = summarise(ladders)["angle"]
-    assert [(p["cpu_ms"], p["error"]) for p in found["front"]] == [(1.0, 0.5), (3.0, 0.05)]
+    assert [(p["cpu_ms"], p["angle"]) for p in found["front"]] == [(1.0, 0.5), (3.0, 0.05)]
     assert found["least"] == 0.05 and found["setting"] == "b"
 
 

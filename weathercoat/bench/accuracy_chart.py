@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
+
+Place = Literal["outside upper left", "outside lower center"]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +56,7 @@ def draw_overview(results: dict[str, Any], stream: BinaryIO) -> None:
         axes.set_ylabel(TITLES["angle"], fontsize=8.5)
     for axes in panels[max(len(cases) - _COLUMNS, 0) : len(cases)]:
         axes.set_xlabel("CPU milliseconds", fontsize=8.5)
-    _finish(figure, panels[0], stream)
+    _finish(figure, panels[0], "outside upper left", stream)
 
 
 def draw_case(number: int, results: dict[str, Any], stream: BinaryIO) -> None:
@@ -71,7 +73,7 @@ def draw_case(number: int, results: dict[str, Any], stream: BinaryIO) -> None:
         axes.set_xlabel("CPU milliseconds", fontsize=9)
         axes.tick_params(labelsize=8)
     figure.suptitle(case["about"], fontsize=11, x=0.01, ha="left")
-    _finish(figure, panels[0], stream)
+    _finish(figure, panels[0], "outside lower center", stream)
 
 
 def make_figure(width: float, height: float) -> Figure:
@@ -102,10 +104,11 @@ def _draw_curves(axes: Axes, case: dict[str, Any], error: str) -> None:
             points = [(p["cpu_ms"], _shown(p[error])) for p in ladder["points"] if p[error] is not None]
             if points:
                 axes.plot(*zip(*points, strict=True), mark, color=color, markersize=2.2, alpha=0.35)
-        summary = curve[error]
+        # film that does not move keeps its lengths, so these are shown where the angles are best
+        summary = curve["gap" if error == "gap" else "angle"]
         if not summary["front"]:
             continue
-        front = [(point["cpu_ms"], _shown(point["error"])) for point in summary["front"]]
+        front = [(point["cpu_ms"], _shown(point[error])) for point in summary["front"]]
         axes.plot(
             *zip(*front, strict=True),
             "-",
@@ -134,12 +137,12 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join(textwrap.wrap(text, width))
 
 
-def _finish(figure: Figure, axes: Axes, stream: BinaryIO) -> None:
-    """Add the legend below and write the picture."""
+def _finish(figure: Figure, axes: Axes, place: Place, stream: BinaryIO) -> None:
+    """Add the legend and write the picture."""
     from matplotlib.lines import Line2D
 
     handles, labels = axes.get_legend_handles_labels()
     handles.append(Line2D([], [], color="#555555", linestyle=":", marker="o", fillstyle="none", markersize=9))
     labels.append("stops: more work gains nothing")
-    figure.legend(handles, labels, loc="outside upper left", ncols=len(labels), fontsize=8.5, frameon=False)
+    figure.legend(handles, labels, loc=place, ncols=len(labels), fontsize=8.5, frameon=False)
     figure.savefig(stream, format="png", dpi=110)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from weathercoat.bench.accuracy import DONE
 from weathercoat.bench.files import rows_as_csv
 from weathercoat.bench.tables import Table, as_lines, digits
 
@@ -23,7 +24,7 @@ def reach_table(results: dict[str, Any], error: str, wanted: float) -> Table:
     """CPU milliseconds in which each method comes within an error on each case; "-" where none of its points
     does.
     """
-    return _by_method(results, lambda curve: _first_within(curve[error]["front"], wanted))
+    return _by_method(results, lambda curve: _first_within(curve, error, wanted))
 
 
 def least_table(results: dict[str, Any], error: str) -> Table:
@@ -44,15 +45,16 @@ def _by_method(results: dict[str, Any], cell: Any) -> Table:
     return [["", *methods], *rows]
 
 
-def _first_within(front: list[dict[str, Any]], wanted: float) -> str:
-    return next((digits(point["cpu_ms"]) for point in front if point["error"] <= wanted), "-")
+def _first_within(curve: dict[str, Any], error: str, wanted: float) -> str:
+    front = curve[error]["front"]
+    return next((digits(point["cpu_ms"]) for point in front if point[error] <= wanted), "-")
 
 
 def _least(summary: dict[str, Any]) -> str:
     if summary["least"] is None:
         return "-"
     text = f"{summary['least']:.1e} in {digits(summary['front'][-1]['cpu_ms'])} ms"
-    return text if summary["stops"] else f"({text})"
+    return text if summary["stops"] or summary["least"] <= DONE else f"({text})"
 
 
 def as_text(results: dict[str, Any]) -> Iterator[str]:

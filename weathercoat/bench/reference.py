@@ -10,18 +10,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.deform.constraints import Constraints, make_constraints, refresh_round, release
-from weathercoat.deform.deformation import DeformParameters
+from weathercoat.deform.deformation import deform
+from weathercoat.deform.energy import energy, make_elastic
+from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.plain import Active, bends_wanted, find_active
 from weathercoat.mesh.dihedral import all_bends
 from weathercoat.mesh.halfedge import HalfEdgeMesh, make_half_edges
 from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.surface import Surface, Vectors
+
+_TIGHT, _MOST_ITERATIONS = 1e-12, 300  # of the solver that finds the answers
+_GROWTH_STEPS, _GROWN_FACES = 20, 2_000
 
 Shape = Callable[[Vectors], Vectors]  # from flat positions (n, 3) to deformed ones
 
@@ -30,13 +36,14 @@ Shape = Callable[[Vectors], Vectors]  # from flat positions (n, 3) to deformed o
 class Answer:
     """What a case must come to.
 
-    positions: (n, 3), of film vertices in use; bends [rad], (a,), and lengths, (l,), of what is active; kind:
-    "exact" for a shape with all aims met, or "minimum".
+    positions: (n, 3), of film vertices in use; bends [rad], (a,), and lengths, (l,), of what is active;
+    energy: as `energy_at`; kind: "exact" for a shape with all aims met, or "minimum".
     """
 
     positions: Vectors
     bends: Vectors
     lengths: Vectors
+    energy: float
     kind: str
 
 
@@ -46,7 +53,8 @@ class ReferenceCase:
 
     name: in file names; about: in a few words. mesh: its positions are the start; rest lengths and angles
     that begin are in the constraints, and `parameters` at `age` say what becomes of these. length: what
-    distances are relative to.
+    distances are relative to. judged_by_aims: bends and lengths are held against what they aim at, also where
+    the answer is a minimum that cannot meet it.
     """
 
     name: str
@@ -59,6 +67,7 @@ class ReferenceCase:
     active: Active
     targets: Vectors
     answer: Answer | None = None
+    judged_by_aims: bool = False
 
     @property
     def can_grow(self) -> bool:
@@ -104,6 +113,7 @@ class Errors:
     angle: float
     length: float
     length_max: float
+    gap: float
 
 
 def make_shaped_case(
@@ -143,7 +153,7 @@ def make_shaped_case(
     refresh_round(mesh, constraints, free)
     parameters = replace(parameters or DeformParameters(), curl_rule="curvature", curl_rate=0.0)
     active = find_active(mesh, constraints)
-    answer = Answer(shaped, bends[active.hinge_edges], active.rest_length, "exact") if exact else None
+    answer = Answer(shaped, bends[active.hinge_edges], active.rest_length, 0.0, "exact") if exact else None
     extent = flat.max(axis=0) - flat.min(axis=0)
     return ReferenceCase(
         name=name,
@@ -183,13 +193,12 @@ def view_film(
     )
 
 
-def with_answer(case: ReferenceCase, positions: Vectors, *, aims: bool = False) -> ReferenceCase:
-    """The case with a converged minimum as its answer; aims: bends and lengths are still held against what
-    they aim at.
-    """
-    bends = case.targets if aims else bends_at(case, positions)
-    lengths = case.active.rest_length if aims else lengths_at(case, positions)
-    return replace(case, answer=Answer(positions.copy(), bends, lengths, "minimum"))
+def with_answer(case: ReferenceCase, positions: Vectors) -> ReferenceCase:
+    """The case with a converged minimum as its answer."""
+    bends = case.targets if case.judged_by_aims else bends_at(case, positions)
+    lengths = case.active.rest_length if case.judged_by_aims else lengths_at(case, positions)
+    least = energy_at(case, positions)
+    return replace(case, answer=Answer(positions.copy(), bends, lengths, least, "minimum"))
 
 
 def bends_at(case: ReferenceCase, positions: Vectors) -> Vectors:
@@ -205,11 +214,41 @@ def lengths_at(case: ReferenceCase, positions: Vectors) -> Vectors:
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
 
+def energy_at(case: ReferenceCase, positions: Vectors) -> float:
+    """The energy of the film, relative to that of film as at rest."""
+    elastic = make_elastic(case.mesh, case.constraints, case.parameters, case.age)
+    return float(energy(elastic, positions).sum() / elastic.scale.sum())
+
+
+def solve_case(case: ReferenceCase) -> ReferenceCase:
+    """The case with the lowest minimum that Newton's method finds as its answer: from the start, from where
+    descent ends, and on small films by targets that grow.
+    """
+    found = [_minimise(case, case.start, 1), _minimise(case, _minimise(case, case.start, 1, "descent"), 1)]
+    if case.can_grow and case.faces <= _GROWN_FACES:
+        found.append(_minimise(case, case.start, _GROWTH_STEPS))
+    return with_answer(case, min(found, key=partial(energy_at, case)))
+
+
+def _minimise(case: ReferenceCase, start: Vectors, steps: int, solver: str = "newton") -> Vectors:
+    """Where a solver comes to from positions (n, 3), its targets growing in so many steps."""
+    mesh = case.mesh_at(start)
+    given = {"deformation.solver": solver, "deformation.tolerance": _TIGHT}
+    for step in range(1, steps + 1):
+        if case.can_grow:
+            case.aim(step / steps)
+        most = _MOST_ITERATIONS if step == steps else _MOST_ITERATIONS // 10
+        deform(
+            mesh, case.constraints, case.parameters_with({**given, "deformation.iterations": most}), case.age
+        )
+    return mesh.positions[: mesh.vertex_count]
+
+
 def measure_errors(case: ReferenceCase, positions: Vectors) -> Errors:
     """How far positions (n, 3) are from the answer of a case; all infinite where one is not finite."""
     assert case.answer is not None
     if not np.isfinite(positions).all():
-        return Errors(*[math.inf] * 5)
+        return Errors(*[math.inf] * 6)
     answer = case.answer
     distance = np.linalg.norm(positions - answer.positions, axis=1)[case.active.free] / case.length
     turned = turn_between(bends_at(case, positions), answer.bends)
@@ -220,6 +259,7 @@ def measure_errors(case: ReferenceCase, positions: Vectors) -> Errors:
         angle=root_mean_square(turned) / root_mean_square(case.targets),
         length=root_mean_square(strain),
         length_max=float(np.abs(strain).max()),
+        gap=energy_at(case, positions) - answer.energy,
     )
 
 

@@ -51,18 +51,15 @@ def make_strip(name: str, faces: int, turn: float, *, irregular: bool) -> Refere
 
     irregular: of random triangles instead of a grid.
     """
-    if irregular:
-        surface = make_random_sheet(faces, width=2.0)
-        clamp = _CLAMPED_EDGES * _mean_edge(surface) / surface.size()
-    else:
+    if not irregular:
         rows = round(math.sqrt(faces / 4))
-        surface = make_plate(2.0, 1.0, 2 * rows, rows)
-        clamp = surface.vertices[1, 0] - surface.vertices[0, 0]
-        clamp = 1.001 * clamp / surface.size()
-    kind = "irregular" if irregular else "regular"
+        about = f"strip, cylinder of {turn:g} degrees, {4 * rows * rows:,} regular faces"
+        return make_folded_strip(name, about, 2 * rows - 1, rows, math.radians(turn) / (2 * rows - 1))
+    surface = make_random_sheet(faces, width=2.0)
+    clamp = _CLAMPED_EDGES * _mean_edge(surface) / surface.size()
     return make_shaped_case(
         name,
-        f"strip, cylinder of {turn:g} degrees, {len(surface.faces):,} {kind} faces",
+        f"strip, cylinder of {turn:g} degrees, {faces:,} irregular faces",
         surface,
         clamped=partial(_near_end, clamp),
         shape=partial(roll, turn=math.radians(turn), flat_part=clamp),
@@ -115,7 +112,7 @@ def make_clamped_sheet(faces: int = SHEET_FACES) -> ReferenceCase:
     the lengths that it has when it is flat: random triangles have no shape with both.
     """
     surface = make_random_sheet(faces, width=SHEET_LENGTH)
-    return make_shaped_case(
+    case = make_shaped_case(
         "clamped-sheet",
         f"clamped sheet, cylinder of {SHEET_TURN:g} degrees, flat lengths, {faces:,} irregular faces",
         surface,
@@ -124,6 +121,7 @@ def make_clamped_sheet(faces: int = SHEET_FACES) -> ReferenceCase:
         exact=False,
         substrate=False,
     )
+    return replace(case, judged_by_aims=True)
 
 
 def make_cracked_disc(rings: int = 16) -> ReferenceCase:

@@ -95,7 +95,7 @@ def make_budget_map(
 
     def cell(values: Values, x: int, y: int) -> str:
         case = make_folded_strip("budget", "", flaps[y], 4, math.pi / flaps[y])
-        given = {**values, "deformation.sweeps": budgets[x]}
+        given = {**values, "deformation.sweeps": budgets[x], "deformation.iterations": budgets[x]}
         shares = grow(_GROWTH_STEPS, _REST_STEPS)
         return classify(follow(case, case.parameters_with(given), shares))
 
