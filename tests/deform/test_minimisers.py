@@ -10,6 +10,8 @@ from tests.deform.folds import STILL, clamped, polygon
 from tests.deform.test_energy import cracked_film
 from tests.sim.runs import assert_invariants, failed_shares, make_run, snapshot_bytes
 from tests.zoo import make_mesh
+from weathercoat.bench.reference import measure_errors
+from weathercoat.bench.reference_cases import make_flap
 from weathercoat.deform.constraints import make_constraints, release
 from weathercoat.deform.deformation import deform
 from weathercoat.deform.descending import Minimise, lift, resting
@@ -92,6 +94,20 @@ def test_a_flat_strip_rolls_up(solver: str) -> None:
     solved = deform(mesh, constraints, parameters, 0.0)
     assert np.abs(mesh.positions[: mesh.vertex_count] - polygon(40, -0.3)).max() < 1e-4
     assert solved.gap is not None and solved.gap <= 1e-9 and solved.unfinished == 0
+
+
+@SOLVERS
+@pytest.mark.parametrize("edges", [4, 24])
+def test_a_wide_flap_rolls_up_in_a_few_iterations(solver: str, edges: int) -> None:
+    """On a grid the first step from flat promises little, though the guess is exact; without it Newton needs
+    some hundred iterations for 24 edges.
+    """
+    case = make_flap(edges)
+    given = {"deformation.solver": solver, "deformation.iterations": 10, "deformation.tolerance": 1e-9}
+    mesh = case.mesh_at(case.start)
+    solved = deform(mesh, case.constraints, case.parameters_with(given), case.age)
+    assert solved.unfinished == 0
+    assert measure_errors(case, mesh.positions[: mesh.vertex_count]).position < 1e-6
 
 
 @SOLVERS
