@@ -78,7 +78,7 @@ EFFECTS: dict[str, Effect] = {
     "curl.angle_rate": Effect((0.3, 6), ("curl.rule=angle", "curl.angle_floor=1.8")),
     "curl.angle_floor": Effect((1.8, 3.0), _ANGLE[:2]),
     "deformation.sweeps": Effect((1, 100)),
-    "deformation.solver": Effect(("sweeps", "newton")),
+    "deformation.solver": Effect(("sweeps", "momentum", "newton")),
     "deformation.film_thickness": Effect((5e-4, 1e-2), ("deformation.solver=newton",)),
     "deformation.angle": Effect(("dihedral", "split", "arccos")),
     "deformation.angle_stiffness": Effect((0.02, 1)),

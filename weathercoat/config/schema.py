@@ -288,11 +288,14 @@ class Curl(Section):
 class Deformation(Section):
     """How separated film is deformed: by position-based sweeps (section 4), or to a minimum of its energy."""
 
-    solver: Literal["sweeps", "descent", "newton", "none"] = parameter(
+    solver: Literal["sweeps", "momentum", "descent", "newton", "none"] = parameter(
         "sweeps",
-        "Sweeps (the paper); descent or newton, which converge; none leaves the film where it separated",
+        "Sweeps (the paper), or with momentum, faster on long curls; descent or newton, which converge; "
+        "none leaves the film where it separated",
     )
-    sweeps: Whole = parameter(10, "Passes over all constraints in a step, with sweeps", ge=0, le=100_000)
+    sweeps: Whole = parameter(
+        10, "Passes over all constraints in a step, with sweeps or momentum", ge=0, le=100_000
+    )
     angle: Literal["dihedral", "split", "arccos"] = parameter(
         "dihedral", "Angle constraint: signed dihedral, the paper's split form, or plain arccos"
     )

@@ -9,6 +9,12 @@ from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.descending import Flags, Minimise, Solved
 from weathercoat.deform.descent import minimise_by_descent
 from weathercoat.deform.energy import make_elastic
+from weathercoat.deform.momentum import (
+    Momentum,
+    make_momentum,
+    sweep_with_momentum,
+    sweep_with_momentum_together,
+)
 from weathercoat.deform.newton import minimise_by_newton
 from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.runs import Runs
@@ -32,15 +38,19 @@ def deform(
     *,
     team: Team | None = None,
     rest: Rest | None = None,
+    momentum: Momentum | None = None,
 ) -> Solved:
     """Run the solver of one step; changes the positions of separated vertices.
 
     A team of threads shares the sweeps where there are enough of them; the result is the same bits. `rest` is
-    needed where vertices may sleep.
+    needed where vertices may sleep, `momentum` where it is to live on from step to step.
     """
     match parameters.deformation_solver:
         case "sweeps":
-            return _sweep(mesh, constraints, parameters, age, team, rest)
+            return _sweep(mesh, constraints, parameters, age, team, rest, None)
+        case "momentum":
+            moving = momentum or make_momentum(mesh, constraints)
+            return _sweep(mesh, constraints, parameters, age, team, rest, moving)
         case "none":
             return Solved(0, 0.0, 0)
         case name:
@@ -70,11 +80,16 @@ def _sweep(
     age: float,
     team: Team | None,
     rest: Rest | None,
+    momentum: Momentum | None,
 ) -> Solved:
-    """The paper's way: every constraint in turn, a number of times."""
+    """The paper's way: every constraint in turn, a number of times; with momentum where there is one."""
     p, c = parameters, constraints
-    if team is not None and team.size > 1 and _hinge_count(c.angles) >= _WORTH_SHARING:
-        _deform_together(mesh.positions, c, p, age, team)
+    is_shared = team is not None and team.size > 1 and _hinge_count(c.angles) >= _WORTH_SHARING
+    sharing = team if is_shared else None
+    if momentum is not None:
+        _deform_with_momentum(mesh, c, p, age, sharing, momentum)
+    elif sharing is not None:
+        _deform_together(mesh.positions, c, p, age, sharing)
     else:
         form = FORMS[p.deformation_angle]
         _aim(c.angles, p, age, as_tangent=form == DIHEDRAL)
@@ -125,6 +140,27 @@ def _deform_together(
         sweep_angles(form, seats, angles, stiffness, inside, angle_tiles)
     if p.deformation_sweeps > 0:
         team.share(end)
+
+
+def _deform_with_momentum(
+    mesh: HalfEdgeMesh,
+    constraints: Constraints,
+    parameters: DeformParameters,
+    age: float,
+    team: Team | None,
+    momentum: Momentum,
+) -> None:
+    """Sweeps that go on in the direction of the ones before, alone or as a team."""
+    p, angles = parameters, constraints.angles
+    form, stiffness = FORMS[p.deformation_angle], p.deformation_angle_stiffness
+    _aim(angles, p, age, as_tangent=form == DIHEDRAL)
+    if team is None:
+        sweep_with_momentum(p.deformation_sweeps, form, stiffness, mesh, constraints, momentum)
+    else:
+        cuts = _cut_evenly(angles, team.size)
+        sweep_with_momentum_together(
+            p.deformation_sweeps, form, stiffness, mesh, constraints, momentum, team, cuts
+        )
 
 
 def _hinge_count(angles: Runs) -> int:

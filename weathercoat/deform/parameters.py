@@ -29,7 +29,7 @@ class DeformParameters:
     curl_rate: float = 10.0
     curl_angle_rate: float = 0.8
     curl_angle_floor: float = 2.6
-    deformation_solver: str = "sweeps"  # or "descent", "newton", "none"
+    deformation_solver: str = "sweeps"  # or "momentum", "descent", "newton", "none"
     deformation_sweeps: int = 10
     deformation_angle: str = "dihedral"  # or "split", "arccos"
     deformation_angle_stiffness: float = 1.0

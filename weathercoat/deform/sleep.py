@@ -104,16 +104,21 @@ def note_moves(
 def join_islands(runs: Runs, vertex: Indices, island: Indices) -> None:
     """Join the vertices that may move and that share an active constraint, in a union-find forest (k,).
 
-    vertex: who sits on a seat.
+    vertex: who sits on a seat. A hinge with an edge of which an end moves is left to the lengths: its other
+    edges have one each.
     """
-    for run in range(len(runs.filled)):
-        first = LANES * runs.first_block[run]
-        for lane in range(first, first + runs.filled[run]):
+    first_block, filled, seats, moves = runs.first_block, runs.filled, runs.seats, runs.moves
+    corners = seats.shape[1]
+    for run in range(len(filled)):
+        first = LANES * first_block[run]
+        for lane in range(first, first + filled[run]):
             b, i = lane // LANES, lane % LANES
+            if corners == 4 and moves[b, 0, i] + moves[b, 1, i] > 0:
+                continue
             one = -1
-            for k in range(runs.seats.shape[1]):
-                if runs.moves[b, k, i] > 0:
-                    root = find_root(island, vertex[runs.seats[b, k, i]])
+            for k in range(corners):
+                if moves[b, k, i] > 0:
+                    root = find_root(island, vertex[seats[b, k, i]])
                     if one >= 0 and root != one:
                         # the smaller number is the root, whatever the order in which vertices are joined
                         island[max(one, root)] = min(one, root)

@@ -11,6 +11,7 @@ import numpy as np
 from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
 from weathercoat.deform.deformation import deform
 from weathercoat.deform.descending import Solved
+from weathercoat.deform.momentum import Momentum, make_momentum
 from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.residual import Residual, measure_residual
 from weathercoat.deform.sleep import Rest, make_rest
@@ -90,12 +91,15 @@ class Simulation:
     team: Team = field(default_factory=Team)
     log: EventLog = field(init=False)
     rest: Rest = field(init=False)
+    momentum: Momentum | None = field(init=False)
     runoff: Runoff = field(init=False)
     agenda: Agenda = field(init=False)
 
     def __post_init__(self) -> None:
         self.log = make_event_log(len(self.mesh.faces))
         self.rest = make_rest(len(self.mesh.twin))
+        has_momentum = self.deform_parameters.deformation_solver == "momentum"
+        self.momentum = make_momentum(self.mesh, self.constraints) if has_momentum else None
         self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
         self.agenda = make_agenda(self.mesh, self.film, make_film_rules(self.film_parameters))
 
@@ -127,7 +131,15 @@ class Simulation:
         decided = time.perf_counter()
 
         self.solving.add(
-            deform(self.mesh, self.constraints, self.deform_parameters, age, team=self.team, rest=self.rest)
+            deform(
+                self.mesh,
+                self.constraints,
+                self.deform_parameters,
+                age,
+                team=self.team,
+                rest=self.rest,
+                momentum=self.momentum,
+            )
         )
         deformed = time.perf_counter()
 
