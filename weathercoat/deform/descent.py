@@ -27,13 +27,13 @@ from weathercoat.deform.descending import (
     slide,
     sum_islands,
 )
-from weathercoat.deform.energy import Elastic, energy, gradient
+from weathercoat.deform.energy import Elastic, bending_away, energy, gradient
 from weathercoat.deform.factor import Factors
 from weathercoat.deform.stiffness import Places, fill_blocks, find_places, hold_and_damp
 from weathercoat.mesh.surface import Vectors
 
 _REMEMBERED = 12  # pairs; 6 need an eighth more iterations
-_DAMPING = 1e-6  # of the mean of a diagonal block
+_DAMPING = 1e-9  # of the mean of a diagonal block
 _LEAST_COSINE = 1e-9  # between a move and the change of the gradient over it, to remember them
 
 
@@ -72,9 +72,11 @@ def minimise_by_descent(
             _prepare(e, places, factors, positions, slope, live)
             continue
         before, slope_before = positions[e.free], slope
-        positions[:], value, share = search(
-            e, positions, value, free_slope, direction, np.zeros_like(direction), live
-        )
+        turn = np.zeros_like(direction)
+        if not pairs:  # the matrix is that of here
+            away = slide(e, bending_away(e, positions, direction), held)
+            turn = slide(e, -factors.solve(np.flatnonzero(live), away), held)
+        positions[:], value, share = search(e, positions, value, free_slope, direction, turn, live)
         live &= ~(gap <= tolerance)
         if not live.any():
             break
