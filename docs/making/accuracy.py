@@ -6,7 +6,7 @@ from pathlib import Path
 
 from making.places import DOCS
 from making.results import fill_page, keep_results
-from weathercoat.bench.accuracy_tables import case_table, least_table, reach_table
+from weathercoat.bench.accuracy_tables import case_table, least_table, reach_table, setting_table
 from weathercoat.bench.files import read_results
 from weathercoat.bench.tables import as_markdown, describe_lines
 
@@ -39,6 +39,8 @@ def _results() -> str:
         "The least angle error, and when; in brackets where it was still falling": least_table(
             results, "angle"
         ),
+        "The setting with which each came to that": setting_table(results, "angle"),
+        "The least energy above the minimum, over that of flat film": least_table(results, "gap"),
         "The largest distance from the answer over the length, likewise": least_table(results, "position"),
     }
     for title, table in tables.items():

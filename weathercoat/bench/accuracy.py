@@ -10,35 +10,37 @@ from statistics import median
 from typing import Any
 
 from weathercoat.bench.machine import describe_machine
-from weathercoat.bench.reference import Errors, ReferenceCase, measure_errors, solve_case
+from weathercoat.bench.reference import ReferenceCase, measure_errors, solve_case
 from weathercoat.bench.reference_cases import make_flap, make_reference_cases
 from weathercoat.deform.deformation import deform
 from weathercoat.errors import UsageError
 
 SWEEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000)
-_SECONDS = 1.0  # CPU time for each so many faces, after which a ladder has no further rung
-_FACES, _MOST_SECONDS = 3_000, 5.0
+_SECONDS, _MOST_SECONDS = 1.0, 3.0  # CPU time after which a ladder has no further rung,
+_FACES, _STEPS = 3_000, 50  # for each so many faces or steps
+_MOST_WORK = 10_000  # sweeps or iterations of all steps, where targets grow
 _SHORT, _REPEATS = 0.02, 3  # CPU seconds below which a rung is timed so many times
-_LAST, _STALLED = 2, 0.9  # so many last rungs that leave more than this share of the error gained nothing
-DONE = 1e-6  # what comes so near has not stopped but arrived
-ERRORS = ("position", "angle", "length", "gap")
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How a method is used: the share of an angle correction, in how many steps the targets grow, and whether
-    it begins a thousandth of the way to the answer instead of flat.
+    """How a method is used: the share of an angle correction, whether the targets grow step by step or are
+    there at once, and whether it begins a thousandth of the way to the answer instead of flat.
     """
 
     stiffness: float = 1.0
-    steps: int = 1
+    growing: bool = False
     nudged: bool = False
 
     @property
     def label(self) -> str:
         """For people."""
-        steps = f"{self.steps} step{'s' if self.steps > 1 else ''}"
-        return f"stiffness {self.stiffness:g}, {steps}" + (", nudged" if self.nudged else "")
+        words = ["growing" if self.growing else "at once"]
+        if self.stiffness < 1.0:
+            words.append(f"stiffness {self.stiffness:g}")
+        if self.nudged:
+            words.append("nudged")
+        return ", ".join(words)
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Method:
     endless: dict[str, Any] = field(default_factory=dict)  # with these it ends only at its budget
 
 
-_SWEEP_SETTINGS = (Setting(), Setting(stiffness=0.3), Setting(steps=20))
+_SWEEP_SETTINGS = (Setting(), Setting(stiffness=0.3), Setting(growing=True))
 
 
 def _sweeps(form: str, settings: tuple[Setting, ...]) -> Method:
@@ -65,7 +67,7 @@ def _sweeps(form: str, settings: tuple[Setting, ...]) -> Method:
 
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)
-_ITERATION_SETTINGS = (Setting(), Setting(steps=20))
+_ITERATION_SETTINGS = (Setting(), Setting(growing=True))
 
 
 def _converging(solver: str) -> Method:
@@ -115,10 +117,10 @@ def bench_accuracy(
             for setting in method.settings:
                 points = list(climb(case, method, setting)) if is_usable(case, setting) else []
                 if points:
-                    ladders.append({"setting": setting.label, **asdict(setting), "points": points})
+                    ladders.append({"setting": setting.label, "points": points})
                 done += 1
                 progress(done, total)
-            curves.append({"method": method.label, "ladders": ladders, **summarise(ladders)})
+            curves.append({"method": method.label, "ladders": ladders})
         found.append(describe_case(case) | {"curves": curves})
     return {"schema": 1, "machine": describe_machine(), "cases": found}
 
@@ -132,24 +134,26 @@ def describe_case(case: ReferenceCase) -> dict[str, Any]:
         "faces": case.faces,
         "free_vertices": len(case.active.free),
         "answer": case.answer.kind,
-        "start": asdict(measure_errors(case, case.start)),
+        "growth_steps": case.growth_steps if case.can_grow else None,
+        "start": _plain(asdict(measure_errors(case, case.start))),
     }
 
 
 def is_usable(case: ReferenceCase, setting: Setting) -> bool:
     """Whether the case can be run so: the targets of frozen film are what they are."""
-    return setting.steps == 1 or case.can_grow
+    return case.can_grow or not setting.growing
 
 
 def climb(case: ReferenceCase, method: Method, setting: Setting) -> Iterator[dict[str, Any]]:
     """The points of a ladder: budget a step, CPU milliseconds of all steps, and errors at the end."""
     assert case.answer is not None
-    enough = min(_SECONDS * max(1.0, case.faces / _FACES), _MOST_SECONDS)
+    steps = case.growth_steps if setting.growing else 1
+    enough = min(_SECONDS * max(1.0, case.faces / _FACES, steps / _STEPS), _MOST_SECONDS)
     start = case.start + 1e-3 * (case.answer.positions - case.start) if setting.nudged else case.start
     mesh, behind, so_far, spent = case.mesh_at(start), 0, 0.0, 0.0
-    most = max(method.budgets)  # of all steps
-    for budget in (budget for budget in method.budgets if budget * setting.steps <= most):
-        if method.goes_on and setting.steps == 1:
+    most = max(method.budgets) if steps == 1 else _MOST_WORK // steps
+    for budget in (budget for budget in method.budgets if budget <= most):
+        if method.goes_on and steps == 1:
             so_far += _run(case, mesh, method, setting, budget - behind)
             behind, work = budget, so_far
             spent = so_far
@@ -163,7 +167,7 @@ def climb(case: ReferenceCase, method: Method, setting: Setting) -> Iterator[dic
             work = median(trials)
             spent += sum(trials)
         errors = measure_errors(case, mesh.positions[: mesh.vertex_count])
-        yield {"budget": budget, "cpu_ms": 1e3 * work, **_plain(errors)}
+        yield {"budget": budget, **_plain({"cpu_ms": 1e3 * work, **asdict(errors)})}
         if spent > enough or not math.isfinite(errors.angle):
             return
 
@@ -178,60 +182,19 @@ def _run(case: ReferenceCase, mesh: Any, method: Method, setting: Setting, budge
     }
     parameters = case.parameters_with(given)
     spent = 0.0
-    for step in range(setting.steps):
+    steps = case.growth_steps if setting.growing else 1
+    for step in range(steps):
         if case.can_grow:
-            case.aim((step + 1) / setting.steps)
+            case.aim((step + 1) / steps)
         started = time.process_time()
         deform(mesh, case.constraints, parameters, case.age)
         spent += time.process_time() - started
     return spent
 
 
-def summarise(ladders: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """What a method comes to over its settings: for each error the front of its points, and where it stops.
-
-    The front is the points that no other one beats in both work and error. `stops`: whether the last rungs of
-    the ladder that went lowest gained nothing any more.
-    """
-    return {error: _summarise(ladders, error) for error in ERRORS}
-
-
-def _summarise(ladders: Sequence[dict[str, Any]], error: str) -> dict[str, Any]:
-    points = [
-        {"setting": ladder["setting"], **point}
-        for ladder in ladders
-        for point in ladder["points"]
-        if point[error] is not None
-    ]
-    if not points:
-        return {"front": [], "least": None, "setting": None, "stops": True}
-    front: list[dict[str, Any]] = []
-    for point in sorted(points, key=lambda point: (point["cpu_ms"], point[error])):
-        if not front or point[error] < front[-1][error]:
-            front.append(point)
-    lowest = front[-1]
-    (climbed,) = (ladder["points"] for ladder in ladders if ladder["setting"] == lowest["setting"])
-    return {
-        "front": front,
-        "least": lowest[error],
-        "setting": lowest["setting"],
-        "stops": lowest[error] > DONE and has_stopped([point[error] for point in climbed]),
-    }
-
-
-def has_stopped(errors: Sequence[float | None]) -> bool:
-    """Whether the last of the errors along a ladder, None for not finite, improve on those before by nothing
-    worth having.
-    """
-    known = [math.inf if error is None else error for error in errors]
-    if len(known) < 2 + _LAST:
-        return False
-    return min(known[-_LAST:]) > _STALLED * min(known[:-_LAST])
-
-
-def _plain(errors: Errors) -> dict[str, float | None]:
-    """Errors as JSON has them: None for what is not finite."""
-    return {name: value if math.isfinite(value) else None for name, value in asdict(errors).items()}
+def _plain(values: dict[str, float]) -> dict[str, float | None]:
+    """Measured values as JSON has them: with four digits, and None for what is not finite."""
+    return {name: float(f"{v:.4g}") if math.isfinite(v) else None for name, v in values.items()}
 
 
 def warm_up(methods: Sequence[Method]) -> None:

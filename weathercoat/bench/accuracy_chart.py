@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
+from weathercoat.bench.accuracy_summary import summarise
+
 Place = Literal["outside upper left", "outside lower center"]
 
 if TYPE_CHECKING:
@@ -41,19 +43,21 @@ def case_charts(results: dict[str, Any]) -> dict[str, Callable[[dict[str, Any], 
 
 
 def draw_overview(results: dict[str, Any], stream: BinaryIO) -> None:
-    """Write the angle error over work of all cases as PNG. Raises ImportError without matplotlib."""
+    """Write the error over work of all cases as PNG: of angles where the answer is exact, of the energy where
+    it is a minimum, of which there may be several. Raises ImportError without matplotlib.
+    """
     cases = results["cases"]
     rows = -(-len(cases) // _COLUMNS)
     figure = make_figure(12.5, 0.8 + 2.9 * rows)
     panels = figure.subplots(rows, min(_COLUMNS, len(cases)), squeeze=False).ravel()
     for axes, case in zip(panels, cases, strict=False):
-        _draw_curves(axes, case, "angle")
+        error = "angle" if case["answer"] == "exact" else "gap"
+        _draw_curves(axes, case, error)
+        axes.set_ylabel(TITLES[error], fontsize=8)
         axes.set_title(_wrapped(case["about"], 46), fontsize=8.5, loc="left")
         axes.tick_params(labelsize=7.5)
     for axes in panels[len(cases) :]:
         axes.set_visible(False)
-    for axes in panels[:: min(_COLUMNS, len(cases))]:
-        axes.set_ylabel(TITLES["angle"], fontsize=8.5)
     for axes in panels[max(len(cases) - _COLUMNS, 0) : len(cases)]:
         axes.set_xlabel("CPU milliseconds", fontsize=8.5)
     _finish(figure, panels[0], "outside upper left", stream)
@@ -62,12 +66,9 @@ def draw_overview(results: dict[str, Any], stream: BinaryIO) -> None:
 def draw_case(number: int, results: dict[str, Any], stream: BinaryIO) -> None:
     """Write the errors of a case over work as PNG. Raises ImportError without matplotlib."""
     case = results["cases"][number]
-    measured = [
-        error for error in TITLES if any(curve.get(error, {}).get("front") for curve in case["curves"])
-    ]
-    figure = make_figure(3.3 * len(measured), 4.0)
-    panels = figure.subplots(1, len(measured), squeeze=False).ravel()
-    for axes, error in zip(panels, measured, strict=True):
+    figure = make_figure(3.3 * len(TITLES), 4.0)
+    panels = figure.subplots(1, len(TITLES))
+    for axes, error in zip(panels, TITLES, strict=True):
         _draw_curves(axes, case, error)
         axes.set_title(TITLES[error], fontsize=9.5, loc="left")
         axes.set_xlabel("CPU milliseconds", fontsize=9)
@@ -105,7 +106,7 @@ def _draw_curves(axes: Axes, case: dict[str, Any], error: str) -> None:
             if points:
                 axes.plot(*zip(*points, strict=True), mark, color=color, markersize=2.2, alpha=0.35)
         # film that does not move keeps its lengths, so these are shown where the angles are best
-        summary = curve["gap" if error == "gap" else "angle"]
+        summary = summarise(curve, "gap" if error == "gap" else "angle")
         if not summary["front"]:
             continue
         front = [(point["cpu_ms"], _shown(point[error])) for point in summary["front"]]

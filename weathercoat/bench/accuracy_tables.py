@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from weathercoat.bench.accuracy import DONE
+from weathercoat.bench.accuracy_summary import DONE, summarise
 from weathercoat.bench.files import rows_as_csv
 from weathercoat.bench.tables import Table, as_lines, digits
 
@@ -31,12 +31,12 @@ def least_table(results: dict[str, Any], error: str) -> Table:
     """The least error that each method comes to on each case, and the milliseconds of that; in brackets where
     it was still falling when the ladder ended.
     """
-    return _by_method(results, lambda curve: _least(curve[error]))
+    return _by_method(results, lambda curve: _least(summarise(curve, error)))
 
 
 def setting_table(results: dict[str, Any], error: str) -> Table:
     """The setting with which each method came to its least error on each case."""
-    return _by_method(results, lambda curve: curve[error]["setting"] or "-")
+    return _by_method(results, lambda curve: summarise(curve, error)["setting"] or "-")
 
 
 def _by_method(results: dict[str, Any], cell: Any) -> Table:
@@ -46,7 +46,7 @@ def _by_method(results: dict[str, Any], cell: Any) -> Table:
 
 
 def _first_within(curve: dict[str, Any], error: str, wanted: float) -> str:
-    front = curve[error]["front"]
+    front = summarise(curve, error)["front"]
     return next((digits(point["cpu_ms"]) for point in front if point[error] <= wanted), "-")
 
 
@@ -77,7 +77,7 @@ def as_csv(results: dict[str, Any]) -> str:
                 "case": case["name"],
                 "faces": case["faces"],
                 "method": curve["method"],
-                **{name: ladder[name] for name in ("stiffness", "steps", "nudged")},
+                "setting": ladder["setting"],
                 **point,
             }
             for case in results["cases"]

@@ -27,7 +27,7 @@ from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.surface import Surface, Vectors
 
 _TIGHT, _MOST_ITERATIONS = 1e-12, 300  # of the solver that finds the answers
-_GROWTH_STEPS, _GROWN_FACES = 20, 2_000
+_GROWN_FACES = 2_000
 
 Shape = Callable[[Vectors], Vectors]  # from flat positions (n, 3) to deformed ones
 
@@ -54,7 +54,7 @@ class ReferenceCase:
     name: in file names; about: in a few words. mesh: its positions are the start; rest lengths and angles
     that begin are in the constraints, and `parameters` at `age` say what becomes of these. length: what
     distances are relative to. judged_by_aims: bends and lengths are held against what they aim at, also where
-    the answer is a minimum that cannot meet it.
+    the answer is a minimum that cannot meet it. growth_steps: in which its targets grow, where they do so.
     """
 
     name: str
@@ -68,6 +68,7 @@ class ReferenceCase:
     targets: Vectors
     answer: Answer | None = None
     judged_by_aims: bool = False
+    growth_steps: int = 20
 
     @property
     def can_grow(self) -> bool:
@@ -226,7 +227,7 @@ def solve_case(case: ReferenceCase) -> ReferenceCase:
     """
     found = [_minimise(case, case.start, 1), _minimise(case, _minimise(case, case.start, 1, "descent"), 1)]
     if case.can_grow and case.faces <= _GROWN_FACES:
-        found.append(_minimise(case, case.start, _GROWTH_STEPS))
+        found.append(_minimise(case, case.start, case.growth_steps))
     return with_answer(case, min(found, key=partial(energy_at, case)))
 
 

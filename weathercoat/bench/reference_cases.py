@@ -25,6 +25,7 @@ FLAPS = (4, 6, 8, 12, 24)  # edges from the clamp to the free end
 SHEET_FACES, SHEET_LENGTH, SHEET_TURN = 9_940, 1.5, 270.0  # the clamped sheet; its width is 1
 _CLAMPED_EDGES = 1.3  # mean edges from the clamped side of an irregular sheet to the first free vertex
 _RUN_STEPS, _FREEZE_STEP = 100, 60  # most film is loose then, and most has not fallen
+_FILM_STEPS = 200  # in which targets grow where a case stands for film that ages
 _MESHES = "WEATHERCOAT_MESHES"
 
 
@@ -57,13 +58,14 @@ def make_strip(name: str, faces: int, turn: float, *, irregular: bool) -> Refere
         return make_folded_strip(name, about, 2 * rows - 1, rows, math.radians(turn) / (2 * rows - 1))
     surface = make_random_sheet(faces, width=2.0)
     clamp = _CLAMPED_EDGES * _mean_edge(surface) / surface.size()
-    return make_shaped_case(
+    case = make_shaped_case(
         name,
         f"strip, cylinder of {turn:g} degrees, {faces:,} irregular faces",
         surface,
         clamped=partial(_near_end, clamp),
         shape=partial(roll, turn=math.radians(turn), flat_part=clamp),
     )
+    return replace(case, growth_steps=_FILM_STEPS)
 
 
 def make_flap(edges: int) -> ReferenceCase:
@@ -150,7 +152,7 @@ def make_uniform_sheet(faces: int = 1_000) -> ReferenceCase:
         exact=False,
     )
     targets = -case.constraints.span[case.active.hinge_edges] / 0.25
-    case = replace(case, targets=targets)
+    case = replace(case, targets=targets, growth_steps=_FILM_STEPS)
     case.aim(1.0)
     return case
 

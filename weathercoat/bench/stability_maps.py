@@ -72,7 +72,7 @@ def make_curl_map(
 
     def cell(values: Values, x: int, y: int) -> str:
         last = max(turns[x], 0.5)
-        case = make_folded_strip("curl", "", 4, 4, last, stretch=stretches[y])
+        case = make_folded_strip("curl", "", 4, 4, last, stretch=stretches[y], substrate=False)
         growing = max(round(last / turns[x]), 1)
         shares = grow(growing, max(growing, _REST_STEPS))
         return classify(follow(case, case.parameters_with(values), shares))
@@ -81,7 +81,7 @@ def make_curl_map(
         "curl",
         "Curl in a step, against the shape of the triangles: a flap of 4 edges",
         "growth of each target in a step [rad]; beyond 0.5 all at once",
-        "cells longer across the flap than along it, times",
+        "width of a cell / its length along the flap",
         tuple(f"{turn:g}" for turn in turns),
         tuple(f"{stretch:g}" for stretch in stretches),
         cell,
