@@ -33,7 +33,9 @@ def make_reference_cases(names: Sequence[str] = ()) -> dict[str, Callable[[], Re
     """What makes each case, by name and in the order of the charts; all, or those named."""
     makers: dict[str, Callable[[], ReferenceCase]] = {
         "cylinder-90": partial(make_strip, "cylinder-90", 300, 90.0, irregular=False),
-        "cylinder-180": partial(make_strip, "cylinder-180", 3_000, 180.0, irregular=True),
+        "cylinder-180": partial(
+            make_strip, "cylinder-180", 3_000, 180.0, irregular=True, growth_steps=_FILM_STEPS
+        ),
         "cylinder-270": partial(make_strip, "cylinder-270", 3_000, 270.0, irregular=False),
         "cylinder-720": partial(make_strip, "cylinder-720", 3_000, 720.0, irregular=True),
         **{f"flap-{edges}": partial(make_flap, edges) for edges in FLAPS},
@@ -47,10 +49,12 @@ def make_reference_cases(names: Sequence[str] = ()) -> dict[str, Callable[[], Re
     return {name: makers[name] for name in (names or makers)}
 
 
-def make_strip(name: str, faces: int, turn: float, *, irregular: bool) -> ReferenceCase:
+def make_strip(
+    name: str, faces: int, turn: float, *, irregular: bool, growth_steps: int = 20
+) -> ReferenceCase:
     """A strip of 2 x 1, clamped at one end, that aims at a cylinder of a turn [degrees].
 
-    irregular: of random triangles instead of a grid.
+    irregular: of random triangles instead of a grid. growth_steps: of an irregular one.
     """
     if not irregular:
         rows = round(math.sqrt(faces / 4))
@@ -65,7 +69,7 @@ def make_strip(name: str, faces: int, turn: float, *, irregular: bool) -> Refere
         clamped=partial(_near_end, clamp),
         shape=partial(roll, turn=math.radians(turn), flat_part=clamp),
     )
-    return replace(case, growth_steps=_FILM_STEPS)
+    return replace(case, growth_steps=growth_steps)
 
 
 def make_flap(edges: int) -> ReferenceCase:
