@@ -10,13 +10,13 @@ from statistics import median
 from typing import Any
 
 from weathercoat.bench.machine import describe_machine
-from weathercoat.bench.reference import ReferenceCase, measure_errors, solve_case
+from weathercoat.bench.reference import ReferenceCase, measure_errors, momentum_of, solve_case
 from weathercoat.bench.reference_cases import make_flap, make_reference_cases
 from weathercoat.deform.deformation import deform
 from weathercoat.errors import UsageError
 
 SWEEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000)
-_SECONDS, _MOST_SECONDS = 1.0, 3.0  # CPU time after which a ladder has no further rung,
+_SECONDS, _MOST_SECONDS = 0.7, 2.0  # CPU time after which a ladder has no further rung,
 _FACES, _STEPS = 3_000, 50  # for each so many faces or steps
 _MOST_WORK = 10_000  # sweeps or iterations of all steps, where targets grow
 _SHORT, _REPEATS = 0.02, 3  # CPU seconds below which a rung is timed so many times
@@ -80,6 +80,7 @@ METHODS = (
     _sweeps("dihedral", _SWEEP_SETTINGS),
     _sweeps("split", _SWEEP_SETTINGS),
     _sweeps("arccos", (Setting(), Setting(nudged=True))),  # what is flat has no gradient in this form
+    Method("momentum", {"deformation.solver": "momentum"}, "deformation.sweeps", SWEEPS, _SWEEP_SETTINGS),
     _converging("descent"),
     _converging("newton"),
 )
@@ -187,7 +188,9 @@ def _run(case: ReferenceCase, mesh: Any, method: Method, setting: Setting, budge
         if case.can_grow:
             case.aim((step + 1) / steps)
         started = time.process_time()
-        deform(mesh, case.constraints, parameters, case.age)
+        if step == 0:
+            momentum = momentum_of(case, parameters)
+        deform(mesh, case.constraints, parameters, case.age, momentum=momentum)
         spent += time.process_time() - started
     return spent
 

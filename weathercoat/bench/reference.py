@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from weathercoat.deform.constraints import Constraints, make_constraints, refresh_round, release
 from weathercoat.deform.deformation import deform
 from weathercoat.deform.energy import energy, make_elastic
+from weathercoat.deform.momentum import Momentum, make_momentum
 from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.plain import Active, bends_wanted, find_active
 from weathercoat.mesh.dihedral import all_bends
@@ -215,6 +216,12 @@ def lengths_at(case: ReferenceCase, positions: Vectors) -> Vectors:
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
 
+def momentum_of(case: ReferenceCase, parameters: DeformParameters) -> Momentum | None:
+    """What a case's film at rest takes along from step to step, where the solver wants that."""
+    has_momentum = parameters.deformation_solver == "momentum"
+    return make_momentum(case.mesh, case.constraints) if has_momentum else None
+
+
 def energy_at(case: ReferenceCase, positions: Vectors) -> float:
     """The energy of the film, relative to that of film as at rest."""
     elastic = make_elastic(case.mesh, case.constraints, case.parameters, case.age)
@@ -238,7 +245,7 @@ def _minimise(case: ReferenceCase, start: Vectors, steps: int, solver: str = "ne
     for step in range(1, steps + 1):
         if case.can_grow:
             case.aim(step / steps)
-        most = _MOST_ITERATIONS if step == steps else _MOST_ITERATIONS // 10
+        most = _MOST_ITERATIONS if step == steps else _MOST_ITERATIONS // 30
         deform(
             mesh, case.constraints, case.parameters_with({**given, "deformation.iterations": most}), case.age
         )

@@ -13,6 +13,7 @@ from weathercoat.bench.reference import (
     ReferenceCase,
     bends_at,
     lengths_at,
+    momentum_of,
     root_mean_square,
     turn_between,
     view_film,
@@ -76,10 +77,10 @@ def follow(
     given shares.
     """
     mesh = case.mesh_at(case.start if start is None else start)
-    recorder = _Recorder()
+    recorder, momentum = _Recorder(), momentum_of(case, parameters)
     for share in shares:
         case.aim(share)
-        deform(mesh, case.constraints, parameters, case.age)
+        deform(mesh, case.constraints, parameters, case.age, momentum=momentum)
         at_share = replace(case, mesh=mesh, targets=share * case.targets)
         if not recorder.add(at_share, root_mean_square(case.targets)):
             break
@@ -94,7 +95,7 @@ def follow_run(simulation: Simulation, rest_steps: int) -> History:
         if step < s.steps:
             s.step()
         else:
-            deform(s.mesh, s.constraints, s.deform_parameters, s.age)
+            deform(s.mesh, s.constraints, s.deform_parameters, s.age, momentum=s.momentum)
         case = view_film(s.mesh, s.constraints, s.deform_parameters, s.age)
         if len(case.targets) and not recorder.add(case, root_mean_square(case.targets)):
             break
