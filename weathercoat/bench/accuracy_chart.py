@@ -54,7 +54,7 @@ def draw_overview(results: dict[str, Any], stream: BinaryIO) -> None:
         error = "angle" if case["answer"] == "exact" else "gap"
         _draw_curves(axes, case, error)
         axes.set_ylabel(TITLES[error], fontsize=8)
-        axes.set_title(_wrapped(case["about"], 46), fontsize=8.5, loc="left")
+        axes.set_title(_wrapped(case["about"], 42), fontsize=8.5, loc="left")
         axes.tick_params(labelsize=7.5)
     for axes in panels[len(cases) :]:
         axes.set_visible(False)
