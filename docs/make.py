@@ -21,12 +21,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from making import accuracy, effects, gallery, pages, speed, stability
+from making import accuracy, convergence, effects, gallery, pages, speed, stability
 
 PARTS = ("pages", "effects", "comparison", "gallery", "first")
 RESULTS = {
     "speed": speed.take_results,
     "accuracy": accuracy.take_results,
+    "convergence": convergence.take_results,
     "stability": stability.take_results,
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from making.convergence import with_convergence
 from making.places import DOCS
 from making.results import fill_page, keep_results
 from weathercoat.bench.accuracy_tables import case_table, least_table, reach_table, setting_table
@@ -14,8 +15,8 @@ PAGE = DOCS / "accuracy.md"
 
 
 def accuracy_page() -> str:
-    """The page, with the tables of the results that are kept beside it."""
-    return fill_page(PAGE, "make charts", _results())
+    """The page, with the tables of all results that are kept beside it."""
+    return with_convergence(fill_page(PAGE, "make charts", _results()))
 
 
 def take_results(folder: Path) -> None:

@@ -14,8 +14,13 @@ _END = "<!-- end of results -->\n"
 
 def fill_page(page: Path, command: str, results: str) -> str:
     """The page with the results between its marks; command: what makes them."""
+    return fill_text(page.read_text(encoding="utf-8"), command, results)
+
+
+def fill_text(text: str, command: str, results: str) -> str:
+    """The same of a text, since a page may hold the results of several commands."""
     begin = f"<!-- results: made by `{command}` -->\n"
-    before, _, rest = page.read_text(encoding="utf-8").partition(begin)
+    before, _, rest = text.partition(begin)
     _, _, after = rest.partition(_END)
     return before + begin + results + _END + after
 

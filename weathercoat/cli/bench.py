@@ -139,6 +139,43 @@ def stability(
     _print(results, as_text, output, quiet=quiet, as_json=as_json)
 
 
+@command.command("convergence")
+@click.argument("solvers", metavar="[SOLVER]...", nargs=-1)
+@click.option(
+    "--faces", type=click.IntRange(100), default=10_000, show_default=True, metavar="N", help="Faces."
+)
+@click.option("--steps", type=click.IntRange(10), default=1000, show_default=True, metavar="N", help="Steps.")
+@options.output("Folder for convergence.json, .csv and .png; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def convergence(
+    solvers: tuple[str, ...],
+    faces: int,
+    steps: int,
+    output: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Age a plate with each solver, or the SOLVERs named, and hold every tenth of the run against its
+    minimum.
+
+    Times are CPU seconds of the steps. Gaps are of the energy above the minimum that is found from there.
+    """
+    from weathercoat.bench.convergence import bench_convergence
+    from weathercoat.bench.convergence_tables import as_csv, as_text, draw_convergence
+
+    folder = _results_folder("convergence", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_convergence(solvers, faces=faces, steps=steps, progress=messages.progress)
+        if folder is not None:
+            charts: dict[str, Draw] = {"convergence": draw_convergence}
+            _write(folder, "convergence", results, as_csv(results), charts, messages.log)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
 def _results_folder(name: str, output: Path | None, *, overwrite: bool) -> RunFolder | None:
     """The folder for a benchmark's results, refused before any work where it cannot be written."""
     from weathercoat.output.folder import RunFolder
