@@ -558,14 +558,20 @@ def break_edge(
     start, end = mesh.tail[h], mesh.tail[g]
     origins = mesh.origin[start], mesh.origin[end]
     first_split = log.counts[0]
+    goes_on_from_start = leads_on(mesh, state, rules, start, end)
+    goes_on_from_end = leads_on(mesh, state, rules, end, start)
     tip_start, tip_end = cut_edge(mesh, log, h)
     inherit_film(state, log, first_split)
     if tip_start:
         state.is_tip[start] = True
         rest_direction(mesh, origins[1], origins[0], state.crack_direction[start])
+        if goes_on_from_end:
+            keep_direction(mesh, state, rules, end, origins[1], origins[0], start)
     if tip_end:
         state.is_tip[end] = True
         rest_direction(mesh, origins[0], origins[1], state.crack_direction[end])
+        if goes_on_from_start:
+            keep_direction(mesh, state, rules, start, origins[0], origins[1], end)
     for side in range(2):
         f = h // 3 if side == 0 else g // 3
         state.fray_age[f] = min(state.fray_age[f], age)
@@ -573,6 +579,24 @@ def break_edge(
             unload_round_crack(mesh, state, rules, age, f, origins[0], origins[1], tip_start, tip_end, stack)
         else:
             set_tension(state, f, rules.face_factor * state.tension_now[f], state.tension_cap[f], age)
+
+
+@kernel
+def keep_direction(
+    mesh: HalfEdgeMesh, state: PlainState, rules: FilmRules, before: int, source: int, target: int, tip: int
+) -> None:
+    """Turn the direction of the new tip, that of the edge from one origin to another, back towards that of
+    the tip before it.
+    """
+    if rules.turning_length == 0.0:
+        return
+    squared = 0.0
+    for axis in range(3):
+        squared += (mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]) ** 2
+    kept = math.exp(-(math.sqrt(squared) / rules.turning_length))
+    mixed = kept * state.crack_direction[before] + (1.0 - kept) * state.crack_direction[tip]
+    norm = mixed[0] ** 2 + mixed[1] ** 2 + mixed[2] ** 2
+    state.crack_direction[tip] = mixed / math.sqrt(norm) if norm > 0.0 else mixed
 
 
 @kernel

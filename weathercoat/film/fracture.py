@@ -28,6 +28,7 @@ from weathercoat.film.state import (
     make_film_rules,
 )
 from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, cut_edge, prev_of
+from weathercoat.mesh.surface import Vectors
 
 _EQUAL = 1e-9  # overloads that differ by less are equal: on a grid last bits would decide
 
@@ -246,12 +247,14 @@ def break_edge(
     start, end = mesh.tail[h], mesh.tail[g]
     origins = mesh.origin[start], mesh.origin[end]
     first_split = log.counts[0]
+    from_start = leads_on(mesh, state, rules, start, end)
+    from_end = leads_on(mesh, state, rules, end, start)
     tip_start, tip_end = cut_edge(mesh, log, h)
     inherit_film(state, log, first_split)
     if tip_start:
-        make_tip(mesh, state, agenda, start, origins[1])
+        make_tip(mesh, state, rules, agenda, start, origins[1], end if from_end else -1)
     if tip_end:
-        make_tip(mesh, state, agenda, end, origins[0])
+        make_tip(mesh, state, rules, agenda, end, origins[0], start if from_start else -1)
     call_hinges(mesh, state, agenda, h, g, log, first_split)
     for turn in range(2):
         side = h if turn == 0 else g
@@ -283,15 +286,39 @@ def call_hinges(
 
 
 @kernel
-def make_tip(mesh: HalfEdgeMesh, state: FilmState, agenda: Agenda, v: int, source: int) -> None:
-    """Make vertex v the tip of a crack that comes from the origin `source`."""
+def make_tip(
+    mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, agenda: Agenda, v: int, source: int, before: int
+) -> None:
+    """Make vertex v the tip of a crack that comes from the origin `source`; before: the vertex that was its
+    tip up to now, -1 for a new crack.
+    """
     edges, twin, step = agenda.edges, mesh.twin, agenda.counts[STEP]
     state.is_tip[v] = True
-    rest_direction(mesh, source, mesh.origin[v], state.crack_direction[v])
+    direction = state.crack_direction[v]
+    length = rest_direction(mesh, source, mesh.origin[v], direction)
+    if before >= 0 and rules.turning_length > 0.0:
+        turn_from(state.crack_direction[before], length / rules.turning_length, direction)
     leaving = mesh.half_edge[v]
     while leaving >= 0:
         call_edge(edges, twin, leaving, step + 1)
         leaving = twin[prev_of(leaving)]
+
+
+@kernel
+def turn_from(old: Vectors, way: float, direction: Vectors) -> None:
+    """Let the unit vector `direction` of a crack's last edge be that of the crack, which was `old` before it;
+    way: how long the edge is, in turning lengths.
+
+    A crack that forgot its direction at each edge would be a random walk of the mesh's step: it closes on
+    itself within a few edges, and the flakes are as small as the mesh allows.
+    """
+    kept = math.exp(-way)
+    squared = 0.0
+    for axis in range(3):
+        direction[axis] = kept * old[axis] + (1.0 - kept) * direction[axis]
+        squared += direction[axis] ** 2
+    if squared > 0.0:
+        direction /= math.sqrt(squared)
 
 
 @kernel

@@ -94,14 +94,18 @@ def relax_face(state: FilmState, rules: FilmRules, f: int, age: float) -> None:
 
 
 @kernel
-def rest_direction(mesh: HalfEdgeMesh, source: int, target: int, out: Vectors) -> None:
-    """Unit vector at rest from one origin to another into out (3,); zero where they coincide."""
+def rest_direction(mesh: HalfEdgeMesh, source: int, target: int, out: Vectors) -> float:
+    """Unit vector at rest from one origin to another into out (3,), zero where they coincide; returns how far
+    apart they are.
+    """
     length = 0.0
     for axis in range(3):
         out[axis] = mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]
         length += out[axis] ** 2
+    length = math.sqrt(length)
     if length > 0.0:
-        out /= math.sqrt(length)
+        out /= length
+    return length
 
 
 @kernel

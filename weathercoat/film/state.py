@@ -17,6 +17,8 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.halfedge import EventLog
 from weathercoat.mesh.surface import Vectors
 
+TURNING = 0.5  # shear lags over which a crack forgets the direction that it came from
+
 
 @dataclass(frozen=True)
 class FilmParameters:
@@ -71,6 +73,7 @@ class FilmRules(NamedTuple):
     cohesion_decay_rate: float
     direction_threshold: float
     direction_factor: float
+    turning_length: float  # over which a crack turns; 0 where its last edge alone gives its direction
     shear_lag: float  # 0 where a break relaxes its two faces only
     face_factor: float
     crack_speed: float  # infinite where each step has one round of fracture
@@ -115,6 +118,7 @@ class FilmState(NamedTuple):
 def make_film_rules(parameters: FilmParameters) -> FilmRules:
     """The numbers that kernels need."""
     p = parameters
+    shear_lag = p.fracture_shear_lag if p.fracture_relaxation == "shear_lag" else 0.0
     return FilmRules(
         saturating=p.tension_law == "saturating",
         tension_initial=p.tension_initial,
@@ -127,7 +131,8 @@ def make_film_rules(parameters: FilmParameters) -> FilmRules:
         cohesion_decay_rate=p.cohesion_decay_rate,
         direction_threshold=p.fracture_direction_threshold,
         direction_factor=p.fracture_direction_factor,
-        shear_lag=p.fracture_shear_lag if p.fracture_relaxation == "shear_lag" else 0.0,
+        turning_length=TURNING * shear_lag,
+        shear_lag=shear_lag,
         face_factor=p.fracture_face_factor,
         crack_speed=p.fracture_speed if p.fracture_rounds == "by_speed" else math.inf,
         drops_islands=p.flaking_rule == "islands",
