@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def command() -> None:
-    """Measure how fast and how accurate it is."""
+    """Measure how fast and how accurate it is, and what the mesh changes."""
 
 
 @command.command("speed")
@@ -173,6 +173,59 @@ def convergence(
         if folder is not None:
             charts: dict[str, Draw] = {"convergence": draw_convergence}
             _write(folder, "convergence", results, as_csv(results), charts, messages.log)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
+@command.command("independence")
+@click.option(
+    "--faces", metavar="N,N,...", help="Sizes of the sheets. Default: 3000,10000,30000,100000,300000."
+)
+@click.option("--seeds", type=int, default=5, show_default=True, metavar="N", help="Runs of each kind.")
+@click.option("--steps", type=int, default=300, show_default=True, metavar="N", help="Steps of a run.")
+@click.option(
+    "--solver",
+    type=click.Choice(["sweeps", "momentum", "descent", "newton", "none"]),
+    default="sweeps",
+    show_default=True,
+    help="Solver of the deformation under the default rules.",
+)
+@options.output("Folder for independence.json, .csv and .png; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def independence(
+    faces: str | None,
+    seeds: int,
+    steps: int,
+    solver: str,
+    output: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Age the same paint on coarser and finer sheets: spacing of cracks, area of flakes, radius of curls.
+
+    By the default rules and by the paper's literal ones, with several seeds; and the spacing of cracks
+    against the shear lag.
+    """
+    from weathercoat.bench.independence import FACES, bench_independence
+    from weathercoat.bench.independence_chart import draw_chart
+    from weathercoat.bench.independence_tables import as_csv, as_text
+
+    folder = _results_folder("independence", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_independence(
+            FACES if faces is None else _parse_faces(faces),
+            seeds=seeds,
+            steps=steps,
+            solver=solver,
+            progress=messages.progress,
+            say=messages.log,
+        )
+        if folder is not None:
+            charts: dict[str, Draw] = {"independence": draw_chart}
+            _write(folder, "independence", results, as_csv(results), charts, messages.log)
     _print(results, as_text, output, quiet=quiet, as_json=as_json)
 
 
