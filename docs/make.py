@@ -11,7 +11,8 @@
                                             performance.md with what `weathercoat bench speed -o FOLDER` wrote
     python docs/make.py accuracy --results FOLDER
     python docs/make.py stability --results FOLDER
-                                            accuracy.md and stability.md, likewise
+    python docs/make.py independence --results FOLDER
+                                            accuracy.md, stability.md and independence.md, likewise
 
 The pictures come from the tool as it is shipped and from generated parts, so anyone can make them again.
 """
@@ -21,7 +22,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from making import accuracy, convergence, effects, gallery, pages, speed, stability
+from making import (
+    accuracy,
+    convergence,
+    effects,
+    gallery,
+    independence,
+    pages,
+    speed,
+    stability,
+)
 
 PARTS = ("pages", "effects", "comparison", "gallery", "first")
 RESULTS = {
@@ -29,6 +39,7 @@ RESULTS = {
     "accuracy": accuracy.take_results,
     "convergence": convergence.take_results,
     "stability": stability.take_results,
+    "independence": independence.take_results,
 }
 
 

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterator
 
 import weathercoat
-from making import accuracy, effects, gallery, speed, stability
+from making import accuracy, effects, gallery, independence, speed, stability
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
@@ -271,6 +271,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "performance.md": speed.performance_page,
     "accuracy.md": accuracy.accuracy_page,
     "stability.md": stability.stability_page,
+    "independence.md": independence.independence_page,
     "python.md": python_page,
 }
 
