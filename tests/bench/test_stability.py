@@ -101,6 +101,13 @@ def test_signed_forms_open_what_is_folded_up_whichever_way_it_is_to_go() -> None
         assert {name for row in fill_map(made, {"deformation.angle": form}) for name in row} == {"converged"}
 
 
+def test_momentum_lives_on_from_step_to_step() -> None:
+    """With one sweep a step there would be none otherwise, and the flap as slow as without."""
+    made = maps.make_budget_map(budgets=(1,), flaps=(4,))
+    assert fill_map(made, {"deformation.solver": "momentum"}) == [["converged"]]
+    assert fill_map(made, DEFAULT) == [["slow"]]
+
+
 def test_unit_and_place_change_nothing_until_digits_are_gone() -> None:
     made = maps.make_scale_map(scales=(1e-9, 1e9), offsets=(1e7, 1e17))
     assert fill_map(made, DEFAULT) == [["converged", "converged"], ["refused", "refused"]]
@@ -114,7 +121,9 @@ def test_what_is_out_of_bounds_is_refused_and_the_bound_is_not() -> None:
         assert "refused" not in row[1:3]
 
 
-def test_results_are_written_cell_by_cell() -> None:
+def test_results_are_written_cell_by_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    small = maps.make_fold_map(folds=(0.5 * math.pi, math.pi))
+    monkeypatch.setattr("weathercoat.bench.stability.make_maps", lambda: iter([small]))
     results = bench_stability(["fold"])
     (made,) = results["maps"]
     cells = len(made["x"]) * len(made["y"]) * len(METHODS)
