@@ -69,7 +69,7 @@ bench: .venv/bench-$(FINGERPRINT)
 	$(BIN)/python docs/make.py speed --results build/bench
 
 # Every benchmark that ends in charts of its own; each keeps its results in docs/ and fills its page.
-CHARTS := accuracy convergence stability independence
+CHARTS := accuracy convergence stability independence fidelity scenes
 
 charts: .venv/bench-$(FINGERPRINT)
 	@mkdir -p build

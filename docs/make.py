@@ -13,6 +13,9 @@
     python docs/make.py stability --results FOLDER
     python docs/make.py independence --results FOLDER
                                             accuracy.md, stability.md and independence.md, likewise
+    python docs/make.py fidelity --results FOLDER
+    python docs/make.py scenes --results FOLDER
+                                            fidelity.md, and the front that `quality` reads
 
 The pictures come from the tool as it is shipped and from generated parts, so anyone can make them again.
 """
@@ -26,6 +29,7 @@ from making import (
     accuracy,
     convergence,
     effects,
+    fidelity,
     gallery,
     independence,
     pages,
@@ -40,6 +44,8 @@ RESULTS = {
     "convergence": convergence.take_results,
     "stability": stability.take_results,
     "independence": independence.take_results,
+    "fidelity": fidelity.take_fidelity,
+    "scenes": fidelity.take_scenes,
 }
 
 

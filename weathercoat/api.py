@@ -15,6 +15,7 @@ from weathercoat.mesh.surface import Surface
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.pictures import PictureParameters, render_snapshot, write_png
 from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
+from weathercoat.plan import make_plan
 from weathercoat.run import prepare_simulation
 from weathercoat.sim.recorders import run_simulation
 from weathercoat.sim.simulation import Simulation
@@ -55,7 +56,8 @@ def simulate(
     threads: how many share a step's work; their number changes no result. progress: called with the steps
     done and their number.
     """
-    simulation = prepare_simulation(surface, load_config(config, overrides).config, threads=threads)
+    plan = make_plan(load_config(config, overrides), surface, len(surface.faces))
+    simulation = prepare_simulation(surface, plan.loaded.config, threads=threads)
     run_simulation(simulation, [], progress, until=round(until * simulation.steps))
     return simulation
 

@@ -43,6 +43,7 @@ from weathercoat.output.report import (
     write_json,
 )
 from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
+from weathercoat.plan import make_plan
 from weathercoat.sim.recorders import Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
 from weathercoat.sim.snapshot import Snapshot
@@ -86,18 +87,21 @@ def run_asset(
     the steps done and their number. log: called with each warning and with what was done, a line each.
     Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
     """
-    config = loaded.config
     say = log or (lambda line: None)
     watch = Stopwatch()
     with report_compiling(say), run_folder.RunFolder(out, overwrite=overwrite) as folder:
         with watch.time("read"):
-            surface, inputs = _read(model, format, config)
+            surface, inputs = _read(model, format, loaded.config)
         name = next(iter(inputs))
         with name_errors(name):
             report_notes(surface.notes, name, say, strict=strict)
-            painted, untouched = split_paint(surface, config)
+            painted, untouched = split_paint(surface, loaded.config)
+            plan = make_plan(loaded, painted, len(surface.faces))
+            config = plan.loaded.config
+            if plan.quality is not None:
+                say(f"quality {plan.quality['asked']}: {plan.quality['why']}")
             with watch.time("remesh"):
-                meshed = _remeshed(painted, config)
+                meshed = remesh_painted(painted, config)
             report_notes(meshed.notes[len(surface.notes) :], name, say, strict=strict)
             with watch.time("prepare"):
                 simulation = prepare_simulation(meshed, config, painted, threads=threads)
@@ -117,6 +121,7 @@ def run_asset(
             inputs=inputs,
             meshes={"input": measure_surface(surface), "film": measure_surface(simulation.surface)},
             notes=meshed.notes,
+            quality=plan.quality,
             stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
             solver=asdict(simulation.solving),
             snapshots=recorder.figures,
@@ -175,7 +180,7 @@ def report_notes(
         raise StrictError(f"{first.code}({first.count}): {first.message}", file=name)
 
 
-def _remeshed(painted: Surface, config: Config) -> Surface:
+def remesh_painted(painted: Surface, config: Config) -> Surface:
     """The surface as the config wants it for the simulation: remeshed, or as it is."""
     wanted = config.remesh
     if not wanted:

@@ -99,6 +99,13 @@ EFFECTS: dict[str, Effect] = {
 WITHOUT_PICTURE: dict[str, str] = {
     "version": "names the schema; no effect on a picture",
     "preset": "stands for the values of a shipped config; see the [gallery](gallery.md)",
+    "quality": "sets several keys at once; see [fidelity](fidelity.md)",
+    "scene.distance": "for `quality: auto`; see [fidelity](fidelity.md)",
+    "scene.nearest": "for `quality: auto`",
+    "scene.field_of_view": "for `quality: auto`",
+    "scene.image_height": "for `quality: auto`",
+    "scene.pixels_per_metre": "for `quality: auto`",
+    "scene.metres_per_unit": "for `quality: auto`",
     "model.up": "turns where rust runs and dust lies, with the model",
     "paint.only": "parts that it leaves out are drawn as they came",
     "paint.except": "parts that it leaves out are drawn as they came",

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterator
 
 import weathercoat
-from making import accuracy, effects, gallery, independence, speed, stability
+from making import accuracy, effects, fidelity, gallery, independence, speed, stability
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
@@ -267,6 +267,7 @@ def _link(folder: object, name: str) -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration_page,
     "errors.md": errors_page,
+    "fidelity.md": fidelity.fidelity_page,
     "gallery.md": gallery_page,
     "performance.md": speed.performance_page,
     "accuracy.md": accuracy.accuracy_page,

@@ -61,7 +61,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["--help"]) == 0
     out = capsys.readouterr().out
     commands = out.partition("Commands:")[2]
-    for name in ("run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion"):
+    for name in ("run", "plan", "config", "sample", "inspect", "remesh", "render", "warmup", "bench"):
         assert f"  {name} " in commands
 
 
@@ -278,6 +278,41 @@ def test_inspect_estimates_grow_with_what_is_asked(capsys: pytest.CaptureFixture
     assert cost("--set", "remesh=off")["seconds"] < standard["seconds"]
 
 
+def test_plan_tells_what_a_run_would_choose(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["sample", "plate"]) == 0
+    capsys.readouterr()
+    assert call(["plan", "plate.obj"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["faces", "10,000"] and lines[-1].startswith("expected cost")
+    steps = []
+    for distance in ("0.5", "1000"):
+        asked = ["--quality", "auto", "--set", f"scene.distance={distance}", "--json"]
+        assert call(["plan", "crackle", "plate.obj", *asked]) == 0
+        found = json.loads(capsys.readouterr().out)
+        steps.append(found["quality"]["chosen"]["steps"])
+        assert found["config"]["ageing"]["steps"] == steps[-1]
+        assert found["cost"]["seconds"] == found["quality"]["expected"]["seconds"]
+    assert steps[0] > steps[1]
+    assert call(["plan", "plate.obj", "--quality", "draft", "--steps", "77"]) == 0
+    assert "ageing.steps, as it is set by --steps" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        ([], "Missing argument"),
+        (["standard", "a.obj", "b.obj"], "one config and one model"),
+        (["--quality", "best", "a.obj"], "'best' is not one of"),
+        (["--quality", "auto", "a.obj"], "auto needs scene.distance"),
+    ],
+)
+def test_plan_refuses_what_it_cannot_plan(
+    arguments: list[str], what: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["plan", *arguments]) == 2
+    assert what in capsys.readouterr().err
+
+
 def test_models_that_cannot_be_read(capsys: pytest.CaptureFixture[str]) -> None:
     Path("page.obj").write_text("<!DOCTYPE html><html></html>")
     for command in (["inspect"], ["remesh", "-o", "x.obj"]):
@@ -310,7 +345,18 @@ def test_completion_scripts_call_back(shell: str, capsys: pytest.CaptureFixture[
     [
         (
             "weathercoat ",
-            {"run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion"},
+            {
+                "run",
+                "plan",
+                "config",
+                "sample",
+                "inspect",
+                "remesh",
+                "render",
+                "warmup",
+                "bench",
+                "completion",
+            },
         ),
         ("weathercoat run cr", {"crackle"}),
         ("weathercoat run crackle a.obj --set curl.ra", {"curl.radius=", "curl.rate="}),

@@ -26,6 +26,7 @@ print("LOADED", code, *loaded)
         ["config", "--help"],
         ["config", "show", "--help"],
         ["config", "list"],
+        ["plan", "--help"],
         ["remesh", "--help"],
         ["inspect", "--help"],
         ["render", "--help"],

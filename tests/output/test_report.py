@@ -149,6 +149,7 @@ def report(**changes: Any) -> dict[str, Any]:
         "inputs": {"a.obj": "00"},
         "meshes": {"input": measure_surface(make_surface(*make_sheet()))},
         "notes": [Note("W-DEGENERATE", 2, "2 faces without area dropped")],
+        "quality": None,
         "stopped": "all steps are done",
         "solver": {"iterations": 10, "largest_gap": None, "unfinished_steps": 0},
         "snapshots": [measure_snapshot(make_snapshot(lost=2))],

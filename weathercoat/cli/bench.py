@@ -67,7 +67,7 @@ def speed(
     from weathercoat.bench.speed import bench_speed
     from weathercoat.bench.tables import as_csv, as_text
 
-    plates = FACES if faces is None else _parse_faces(faces)
+    plates = FACES if faces is None else _parse_whole_numbers("--faces", faces)
     folder = _results_folder("speed", output, overwrite=overwrite)
     with Messages(quiet=quiet or as_json) as messages:
         results = bench_speed(
@@ -216,7 +216,7 @@ def independence(
     folder = _results_folder("independence", output, overwrite=overwrite)
     with Messages(quiet=quiet or as_json) as messages:
         results = bench_independence(
-            FACES if faces is None else _parse_faces(faces),
+            FACES if faces is None else _parse_whole_numbers("--faces", faces),
             seeds=seeds,
             steps=steps,
             solver=solver,
@@ -227,6 +227,64 @@ def independence(
             charts: dict[str, Draw] = {"independence": draw_chart}
             _write(folder, "independence", results, as_csv(results), charts, messages.log)
     _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
+@command.command("fidelity")
+@click.option(
+    "--seeds", metavar="N,N,...", default="1,2", show_default=True, help="Seeds that every way runs with."
+)
+@options.output(
+    "Folder for fidelity.json, .csv, .png and quality.json, the front; without it nothing is written."
+)
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def fidelity(seeds: str, output: Path | None, overwrite: bool, quiet: bool, as_json: bool) -> None:
+    """Seconds against the error of what a viewer sees, in many ways to run, beside a fine reference.
+
+    Meshes, numbers of steps and solvers on one plate; areas over the age, cracks, the place and outline of
+    the film, and pictures at several sizes. The ways that no other beats are what `quality` chooses from. It
+    takes about ten minutes.
+    """
+    from weathercoat.bench.fidelity import bench_fidelity
+    from weathercoat.bench.fidelity_chart import draw_chart
+    from weathercoat.bench.fidelity_tables import as_csv, as_text, make_front
+
+    wanted = _parse_whole_numbers("--seeds", seeds)
+    folder = _results_folder("fidelity", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_fidelity(seeds=wanted, progress=messages.progress, say=messages.log)
+        if folder is not None:
+            front = {"quality.json": make_front(results)}
+            charts = {"fidelity": draw_chart}
+            _write(folder, "fidelity", results, as_csv(results), charts, messages.log, front)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
+@command.command("scenes")
+@options.assignments
+@options.output("Folder for scenes.json and scenes.csv; without it nothing is written.")
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def scenes(
+    assignments: tuple[str, ...], output: Path | None, overwrite: bool, quiet: bool, as_json: bool
+) -> None:
+    """What `quality: auto` picks for a near, a middle and a far view, beside the reference.
+
+    On a plate and a barrel, with seeds that the front was not measured with. It takes about ten minutes.
+    """
+    from weathercoat.bench.scenes import as_csv, bench_scenes, scenes_table
+    from weathercoat.bench.tables import as_lines
+
+    folder = _results_folder("scenes", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_scenes(overrides=assignments, progress=messages.progress, say=messages.log)
+        if folder is not None:
+            _write(folder, "scenes", results, as_csv(results), {}, messages.log)
+    _print(results, lambda found: as_lines(scenes_table(found)), output, quiet=quiet, as_json=as_json)
 
 
 def _results_folder(name: str, output: Path | None, *, overwrite: bool) -> RunFolder | None:
@@ -243,12 +301,16 @@ def _write(
     table: str,
     charts: Mapping[str, Draw],
     say: Callable[[str], None],
+    more: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
-    """Fill the folder; says why there are no charts, if there are none."""
+    """Fill the folder, with `more` files of JSON; says why there are no charts, if there are none."""
     from weathercoat.bench.files import write_results
+    from weathercoat.output.report import write_json
 
     with folder as path:
         missing = write_results(path, name, results, table, charts)
+        for file, content in (more or {}).items():
+            write_json(path / file, content)
     if missing:
         say(missing)
 
@@ -270,12 +332,12 @@ def _print(
             click.echo(f"written to {output}")
 
 
-def _parse_faces(text: str) -> tuple[int, ...]:
+def _parse_whole_numbers(option: str, text: str) -> tuple[int, ...]:
     if text == "none":
         return ()
     try:
         return tuple(int(part) for part in text.replace("_", "").split(","))
     except ValueError:
         raise UsageError(
-            f"--faces: {text!r} is no list of whole numbers", remedy="write them as 3000,10000"
+            f"{option}: {text!r} is no list of whole numbers", remedy="write them as 3000,10000"
         ) from None

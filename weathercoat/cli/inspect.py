@@ -30,18 +30,18 @@ def command(
     as_json: bool,
 ) -> None:
     """Tell the faces, components, boundary and manifoldness of MODEL, its repairs, and the cost of a run."""
-    from weathercoat.cli.cost import estimate_cost
     from weathercoat.cli.messages import Messages
     from weathercoat.cli.reading import read_model
     from weathercoat.config.load import load_config
     from weathercoat.mesh.inspect import inspect_surface
+    from weathercoat.plan import make_plan
     from weathercoat.run import report_compiling
 
     loaded = load_config(config, assignments)
     with Messages(quiet=as_json) as messages, report_compiling(messages.log):
         surface = read_model(model, model_format, up=loaded.config.model.up)
         found = inspect_surface(surface, self_intersections=self_intersections)
-    cost = estimate_cost(loaded.config, len(surface.faces))
+    cost = make_plan(loaded, surface, len(surface.faces)).cost
     found["run_cost"] = {"seconds": round(cost.seconds, 1), "memory_mb": round(cost.memory / 1e6)}
     if as_json:
         click.echo(json.dumps(found, indent=2, ensure_ascii=False))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from weathercoat.config.presets import preset_names
+from weathercoat.config.quality import AUTO, LEVELS
+
+if TYPE_CHECKING:
+    from weathercoat.config.load import Override
 
 
 class _ConfigName(click.ParamType):
@@ -47,6 +51,11 @@ assignments = click.option(
 seed = click.option("--seed", type=int, metavar="N", help="Override seed.")
 steps = click.option("--steps", type=int, metavar="N", help="Override ageing.steps.")
 faces = click.option("--faces", type=int, metavar="N", help="Override remesh.faces.")
+quality = click.option(
+    "--quality",
+    type=click.Choice([*LEVELS, AUTO]),
+    help="Override quality: how fine a mesh, how many steps and which solver; auto needs a scene.",
+)
 model_format = click.option(
     "--format",
     "model_format",
@@ -67,6 +76,16 @@ log_file = click.option(
     "--log-file", type=click.Path(path_type=Path, dir_okay=False), help="Write all messages to a file too."
 )
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Print the traceback of an error.")
+
+
+def shortcuts(**values: object) -> Iterator[Override]:
+    """What the options `quality`, `seed`, `steps` and `faces` override, of those that were given."""
+    from weathercoat.config.load import Override
+
+    keys = {"quality": "quality", "seed": "seed", "steps": "ageing.steps", "faces": "remesh.faces"}
+    for option, value in values.items():
+        if value is not None:
+            yield Override(keys[option], value, f"--{option}")
 
 
 def output(what: str, *, required: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

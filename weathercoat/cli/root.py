@@ -12,7 +12,18 @@ import click
 
 from weathercoat import __version__
 
-_SUBCOMMANDS = ("run", "config", "sample", "inspect", "remesh", "render", "warmup", "bench", "completion")
+_SUBCOMMANDS = (
+    "run",
+    "plan",
+    "config",
+    "sample",
+    "inspect",
+    "remesh",
+    "render",
+    "warmup",
+    "bench",
+    "completion",
+)
 
 
 class _Subcommands(click.Group):

@@ -6,16 +6,13 @@ import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
 from weathercoat.errors import UsageError
-
-if TYPE_CHECKING:
-    from weathercoat.config.load import Override
 
 _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
 
@@ -25,6 +22,7 @@ _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
 @options.model
 @options.output("Folder of the results; MODEL-CONFIG by default.")
 @options.assignments
+@options.quality
 @options.seed
 @options.steps
 @options.faces
@@ -41,6 +39,7 @@ def command(
     model: str,
     output: Path | None,
     assignments: tuple[str, ...],
+    quality: str | None,
     seed: int | None,
     steps: int | None,
     faces: int | None,
@@ -62,7 +61,9 @@ def command(
 
     if output == Path("-"):
         raise UsageError("the results are a folder, not a stream", remedy="name the folder with -o")
-    loaded = load_config(config, [*assignments, *_shortcuts(seed, steps, faces)])
+    loaded = load_config(
+        config, [*assignments, *options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)]
+    )
     is_piped = model == "-"
     stem = "model" if is_piped else Path(model).stem
     folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
@@ -85,18 +86,6 @@ def command(
         click.echo(json.dumps(report, indent=2, ensure_ascii=False))
     elif not quiet:
         click.echo("\n".join([*_table(report), f"written to {folder}"]))
-
-
-def _shortcuts(seed: int | None, steps: int | None, faces: int | None) -> Iterator[Override]:
-    from weathercoat.config.load import Override
-
-    for option, key, value in (
-        ("seed", "seed", seed),
-        ("steps", "ageing.steps", steps),
-        ("faces", "remesh.faces", faces),
-    ):
-        if value is not None:
-            yield Override(key, value, f"--{option}")
 
 
 def _table(report: dict[str, Any]) -> Iterator[str]:

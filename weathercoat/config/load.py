@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from weathercoat.config.document import LARGEST_FILE, Item, read_document, read_value, without_lines
 from weathercoat.config.presets import preset_names, preset_path
+from weathercoat.config.quality import AUTO, point_of, with_point
 from weathercoat.config.schema import Config, parameters, section_at
 from weathercoat.config.wording import KeyPath, color_hint, did_you_mean, explain
 from weathercoat.errors import ConfigError, ConfigProblem
@@ -36,13 +37,15 @@ class Override(NamedTuple):
 class LoadedConfig:
     """A valid config, and for each of its dotted keys where the value came from.
 
-    origins: `default`, `preset NAME`, `FILE:LINE`, or the option, such as `--set`.
-    source: the path or the name that was asked for.
+    origins: `default`, `preset NAME`, `FILE:LINE`, `quality NAME`, or the option, such as `--set`.
+    source: the path or the name that was asked for. fixed: keys that were set where `quality` was, or after
+    it (presets come before the file, the file before options): the quality does not change them.
     """
 
     config: Config
     origins: Mapping[str, str]
     source: str
+    fixed: frozenset[str] = frozenset()
 
 
 class _Origin(NamedTuple):
@@ -63,8 +66,9 @@ def load_config(
 ) -> LoadedConfig:
     """Load a YAML file or a shipped config by name; a regular file of that name comes first.
 
-    overrides: `key.path=value` as given to `--set`, the value in YAML; later ones win.
-    Raises `ConfigError` with every problem.
+    overrides: `key.path=value` as given to `--set`, the value in YAML; later ones win. A quality has set what
+    it sets, but for `auto`, which needs the model (see `weathercoat.plan`). Raises `ConfigError` with every
+    problem.
     """
     source = os.fspath(path_or_preset)
     merge = _Merge()
@@ -83,8 +87,29 @@ def load_config(
     for layer in layers:
         merge.add(layer)
     config = merge.validate()
-    origins = {key: merge.origins.get(tuple(key.split(".")), DEFAULT) for key in resolved_keys(config)}
-    return LoadedConfig(config, {key: str(origin) for key, origin in origins.items()}, source)
+    origins = {
+        key: merge.origins.get(tuple(key.split(".")), _Origin(DEFAULT, 0)) for key in resolved_keys(config)
+    }
+    loaded = LoadedConfig(
+        config,
+        {key: str(origin) for key, origin in origins.items()},
+        source,
+        _fixed_keys(origins, layers),
+    )
+    if config.quality is None or config.quality == AUTO:
+        return loaded
+    return with_point(loaded, point_of(config.quality), f"quality {config.quality}")
+
+
+def _fixed_keys(origins: Mapping[str, _Origin], layers: Sequence[_Layer]) -> frozenset[str]:
+    """The keys whose values come from where `quality` comes from, or from what has more say."""
+    say = {layers[0].where: 1, **{layer.where: 2 for layer in layers[1:]}}
+
+    def say_of(key: str) -> int:
+        where = origins[key].where
+        return say.get(where, -1 if where == DEFAULT else 0)
+
+    return frozenset(key for key in origins if say_of(key) >= max(say_of("quality"), 0))
 
 
 def resolved_keys(config: Config) -> list[str]:

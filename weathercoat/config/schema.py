@@ -79,6 +79,7 @@ def _remesh_tag(value: object) -> str:
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 Real = Annotated[float, BeforeValidator(_require_number)]
 Whole = Annotated[int, BeforeValidator(_require_number)]
+PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(_require_number)] | None
 Names = Annotated[
     tuple[str, ...],
     BeforeValidator(_at_least_one_word),
@@ -129,6 +130,38 @@ class Model(Section):
     up: Annotated[Axis | tuple[float, float, float], BeforeValidator(_parse_up)] = parameter(
         "auto", "The direction against gravity in the model's axes; auto follows the convention of its format"
     )
+
+
+class Scene(Section):
+    """How large the model is seen, for `quality: auto`: by a camera, or in pixels per metre."""
+
+    distance: PositiveOrNone = parameter(
+        None, "From the camera to the nearest part of the model", unit="model units"
+    )
+    nearest: PositiveOrNone = parameter(
+        None, "Nearest approach of a camera that moves; counts instead of distance", unit="model units"
+    )
+    field_of_view: Real = parameter(
+        40.0, "Angle of view of the camera, from top to bottom", unit="degrees", gt=0, lt=180
+    )
+    image_height: Whole = parameter(1080, "Height of the image", unit="pixels", ge=1, le=1_000_000)
+    pixels_per_metre: PositiveOrNone = parameter(
+        None, "Pixels for a metre of the surface, instead of a camera", unit="pixels per metre"
+    )
+    metres_per_unit: Real = parameter(
+        1.0, "Length of a unit of the model, for pixels_per_metre", unit="metres", gt=0, le=1e9
+    )
+
+    def pixels_per_unit(self) -> float | None:
+        """Pixels for a unit of the model where it is nearest to the camera; None where the scene does not
+        tell.
+        """
+        if self.pixels_per_metre is not None:
+            return self.pixels_per_metre * self.metres_per_unit
+        away = self.distance if self.nearest is None else self.nearest
+        if away is None:
+            return None
+        return self.image_height / (2.0 * away * math.tan(math.radians(self.field_of_view) / 2.0))
 
 
 class Paint(Section):
@@ -424,7 +457,13 @@ class Config(Section):
         (), "Shipped configs whose values come before those of the file, the last one winning"
     )
     seed: Whole = parameter(1, "Seed of every random number", ge=0, le=LARGEST_SEED)
+    quality: Literal["draft", "standard", "fine", "reference", "auto"] | None = parameter(
+        None,
+        "Sets faces, steps and solver where they are not set beside it or after it: a point on the measured "
+        "front of cost against error, or auto, the cheapest one that the scene allows",
+    )
     model: Model = Model()
+    scene: Scene = Scene()
     paint: Paint = Paint()
     remesh: RemeshOrOff = Remesh()
     ageing: Ageing = Ageing()
@@ -451,6 +490,11 @@ class Config(Section):
         if self.snapshots.steps and self.snapshots.steps[-1] > self.ageing.steps:
             last, end = self.snapshots.steps[-1], self.ageing.steps
             found.append(("snapshots.steps", f"step {last} is after the end, ageing.steps is {end}"))
+        scene = self.scene
+        if scene.pixels_per_metre is not None and (scene.distance or scene.nearest):
+            found.append(("scene.pixels_per_metre", "give it or the distance of a camera, not both"))
+        if self.quality == "auto" and scene.pixels_per_unit() is None:
+            found.append(("quality", "auto needs scene.distance, scene.nearest or scene.pixels_per_metre"))
         return found
 
     def as_dict(self) -> dict[str, Any]:

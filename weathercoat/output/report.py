@@ -156,6 +156,7 @@ def make_report(
     inputs: Mapping[str, str],
     meshes: Mapping[str, Mapping[str, Any]],
     notes: Iterable[Note],
+    quality: Mapping[str, Any] | None,
     stopped: str,
     solver: Mapping[str, Any],
     snapshots: Sequence[Mapping[str, Any]],
@@ -163,9 +164,9 @@ def make_report(
     """The content of `run.json`.
 
     config: the resolved values; inputs: SHA-256 by file name, without folders, which differ from machine to
-    machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; stopped: why the
-    run ended; solver: what it did in all steps; snapshots: the figures of each. Figures are rounded to 12
-    digits, the config is not.
+    machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; quality: what
+    a quality that was asked for has set, None without one; stopped: why the run ended; solver: what it did
+    in all steps; snapshots: the figures of each. Figures are rounded to 12 digits, the config is not.
     """
     return {
         "report_version": REPORT_VERSION,
@@ -175,6 +176,7 @@ def make_report(
         "inputs": {name: {"sha256": digest} for name, digest in inputs.items()},
         "meshes": _rounded(meshes),
         "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],
+        "quality": _rounded(quality),
         "stopped": stopped,
         "solver": _rounded(solver),
         "snapshots": _rounded(snapshots),
