@@ -34,3 +34,4 @@ def test_a_build_holds_the_configs_and_finds_them(tmp_path: Path) -> None:
     shipped = {path.name for path in (built / "weathercoat" / "configs").iterdir()}
     assert shipped == {path.name for path in presets_folder().glob("*.yaml")}
     assert (built / "weathercoat" / "py.typed").exists()
+    assert (built / "weathercoat" / "config" / "quality.json").exists()

@@ -50,5 +50,5 @@ WAYS = (
     *(Way(3_000, steps, "newton") for steps in (50, 100)),
     *(Way(10_000, steps, "newton") for steps in (50, 100, 200, 500)),
     *(Way(20_000, steps, "newton") for steps in (100, 200)),
-    *(Way(40_000, steps, "newton") for steps in (100, 200, 350)),
+    *(Way(40_000, steps, "newton") for steps in (100, 200)),
 )
