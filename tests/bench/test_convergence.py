@@ -16,8 +16,12 @@ def test_newton_stays_near_its_minimum_and_sweeps_do_not() -> None:
     results = bench_convergence(
         ("sweeps", "newton"), faces=600, steps=40, progress=lambda done, total: told.append((done, total))
     )
-    assert told == [(1, 2), (2, 2)]
+    assert told[1] == (2, 6) and told[-1] == (6, 6)
     sweeps, newton = results["runs"]
+    strip, uniform, flat_clamp, rolled_clamp = results["sheets"]
+    assert strip["position"] < 5e-3 and uniform["gap"] < 1e-2
+    assert rolled_clamp["angle"] < 0.02 < flat_clamp["angle"] < 0.05
+    assert max(flat_clamp["length"], rolled_clamp["length"]) < 5e-4
     assert newton["largest_gap"] < 0.05 < sweeps["largest_gap"]
     assert newton["largest_strain"] < sweeps["largest_strain"]
     assert newton["iterations"] >= 40 and newton["unfinished_steps"] == 0

@@ -28,12 +28,31 @@ def run_table(results: dict[str, Any]) -> Table:
     return table
 
 
+def sheet_table(results: dict[str, Any]) -> Table:
+    """How near to their answers the sheets came that were followed, and what that cost."""
+    table = [["", "steps", "CPU s", "iterations a step", "position", "angle", "length", "gap"]]
+    for sheet in results["sheets"]:
+        errors = [f"{sheet[name]:.1e}" for name in ("position", "angle", "length", "gap")]
+        table.append(
+            [
+                f"{sheet['sheet']}, {sheet['solver']}",
+                f"{sheet['steps']}",
+                digits(sheet["cpu_seconds"]),
+                digits(sheet["iterations"] / sheet["steps"]),
+                *errors,
+            ]
+        )
+    return table
+
+
 def as_text(results: dict[str, Any]) -> Iterator[str]:
     """The results for the terminal, line by line."""
     yield from describe_lines(results["machine"])
     plate = results["plate"]
     yield f"plate of {plate['faces']:,} faces, {plate['steps']:,} steps"
     yield from as_lines(run_table(results))
+    if results["sheets"]:
+        yield from as_lines(sheet_table(results))
 
 
 def as_csv(results: dict[str, Any]) -> str:

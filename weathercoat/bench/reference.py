@@ -127,12 +127,14 @@ def make_shaped_case(
     shape: Shape,
     exact: bool = True,
     substrate: bool = True,
+    clamp_shaped: bool = False,
     parameters: DeformParameters | None = None,
 ) -> ReferenceCase:
     """A flat film whose hinges aim at the bends of a deformed shape; the film lies still but for its clamp.
 
     clamped, shape: of flat positions (n, 3), which are scaled to unit area. exact: the edges aim at the
-    lengths in the shape, which is then the answer; otherwise at those of the flat film.
+    lengths in the shape, which is then the answer; otherwise at those of the flat film. clamp_shaped: the
+    clamp holds its vertices where the shape has them, not where the flat film has them.
     """
     surface = replace(surface, vertices=surface.vertices / surface.size())
     ordered, _ = order_surface(surface, surface.vertices)
@@ -148,6 +150,8 @@ def make_shaped_case(
     if exact:
         corner = shaped[mesh.faces]
         constraints.rest_length[:] = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).ravel()
+    if clamp_shaped:
+        mesh.positions[: len(flat)][held] = shaped[held]
     free = np.flatnonzero(~held).astype(np.int32)
     release(mesh, constraints, free, 0.0)
     paired = mesh.twin > np.arange(len(mesh.twin))

@@ -41,6 +41,7 @@ def make_reference_cases(names: Sequence[str] = ()) -> dict[str, Callable[[], Re
         **{f"flap-{edges}": partial(make_flap, edges) for edges in FLAPS},
         "cracked-disc": make_cracked_disc,
         "clamped-sheet": make_clamped_sheet,
+        "rolled-clamp": partial(make_clamped_sheet, rolled=True),
         "uniform-curl": make_uniform_sheet,
         "cracked-plate": partial(make_cracked_plate, "cracked-plate", 10_000),
         "closed-shape": make_closed_shape,
@@ -113,19 +114,22 @@ def make_folded_strip(
     )
 
 
-def make_clamped_sheet(faces: int = SHEET_FACES) -> ReferenceCase:
+def make_clamped_sheet(faces: int = SHEET_FACES, *, rolled: bool = False) -> ReferenceCase:
     """A sheet of 1.5 x 1 without metal below it that aims at the bends of a cylinder of 270 degrees, and at
-    the lengths that it has when it is flat: random triangles have no shape with both.
+    the lengths that it has when it is flat: random triangles have no shape with both. Its clamp is flat, so
+    that hinges beside it cannot turn as they should, or rolled as the cylinder is.
     """
     surface = make_random_sheet(faces, width=SHEET_LENGTH)
     case = make_shaped_case(
-        "clamped-sheet",
-        f"clamped sheet, cylinder of {SHEET_TURN:g} degrees, flat lengths, {faces:,} irregular faces",
+        "rolled-clamp" if rolled else "clamped-sheet",
+        f"{'sheet in a rolled clamp' if rolled else 'clamped sheet'}, cylinder of {SHEET_TURN:g} degrees, "
+        f"flat lengths, {faces:,} irregular faces",
         surface,
         clamped=partial(_near_end, _CLAMPED_EDGES * _mean_edge(surface) / surface.size()),
         shape=partial(roll, turn=math.radians(SHEET_TURN)),
         exact=False,
         substrate=False,
+        clamp_shaped=rolled,
     )
     return replace(case, judged_by_aims=True)
 
