@@ -8,6 +8,7 @@ are compared.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,16 +40,17 @@ def bench_independence(
     seeds: int = 5,
     steps: int = 300,
     solver: str = "sweeps",
+    shear_lag: float = SHEAR_LAG,
     shear_lags: Sequence[float] = SHEAR_LAGS,
     progress: Callable[[int, int], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Any]:
     """The results on generated square sheets of so many faces, as plain values.
 
-    solver: `deformation.solver` of the default rules; the literal ones have their own. shear_lags: of the
-    runs that compare crack spacing with it, on a sheet of 30,000 faces or the largest that is asked for.
-    progress: called with the runs done and their number. Raises UsageError for too few faces, seeds or
-    steps.
+    solver: `deformation.solver` of the default rules; the literal ones have their own. shear_lag: of the runs
+    that compare meshes. shear_lags: of those that compare crack spacing with it, on a sheet of 30,000 faces
+    or the largest that is asked for. progress: called with the runs done and their number. Raises UsageError
+    for too few faces, seeds or steps.
     """
     if not faces or min(faces) < FEWEST_FACES:
         raise UsageError(f"--faces: sheets have at least {FEWEST_FACES} faces")
@@ -57,17 +59,19 @@ def bench_independence(
     of_shear_lags = min(SHEAR_LAG_FACES, max(faces))
     runs: list[dict[str, Any]] = []
     sizes = sorted({*faces, of_shear_lags})
-    total = seeds * sum(len(list(_kinds(n, faces, of_shear_lags, shear_lags))) for n in sizes)
+    kinds = partial(
+        _kinds, faces=faces, shear_lag=shear_lag, of_shear_lags=of_shear_lags, shear_lags=shear_lags
+    )
+    total = seeds * sum(len(list(kinds(n))) for n in sizes)
     for count in sizes:
         say(f"{count:,} faces")
         surface = make_random_sheet(count)
-        for kind, rules, shear_lag in _kinds(count, faces, of_shear_lags, shear_lags):
+        for kind, rules, lag in kinds(count):
             for seed in range(1, seeds + 1):
-                config = independence_config(rules, shear_lag, seed, steps, solver)
+                config = independence_config(rules, lag, seed, steps, solver)
                 figures = measure_run(surface, config)
                 runs.append(
-                    {"kind": kind, "rules": rules, "faces": count, "shear_lag": shear_lag, "seed": seed}
-                    | figures
+                    {"kind": kind, "rules": rules, "faces": count, "shear_lag": lag, "seed": seed} | figures
                 )
                 progress(len(runs), total)
     means = average_runs(runs)
@@ -84,15 +88,15 @@ def bench_independence(
 
 
 def _kinds(
-    count: int, faces: Sequence[int], of_shear_lags: int, shear_lags: Sequence[float]
+    count: int, *, faces: Sequence[int], shear_lag: float, of_shear_lags: int, shear_lags: Sequence[float]
 ) -> Iterator[tuple[str, str, float]]:
     """What is run on a sheet: (kind of run, rules, shear lag)."""
     if count in faces:
         for rules in RULES if count <= MOST_LITERAL_FACES else RULES[:1]:
-            yield "faces", rules, SHEAR_LAG
+            yield "faces", rules, shear_lag
     if count == of_shear_lags:
-        for shear_lag in shear_lags:
-            yield "shear_lag", "standard", shear_lag
+        for other in shear_lags:
+            yield "shear_lag", "standard", other
 
 
 def independence_config(rules: str, shear_lag: float, seed: int, steps: int, solver: str) -> Config:

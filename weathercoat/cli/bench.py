@@ -189,6 +189,14 @@ def convergence(
     show_default=True,
     help="Solver of the deformation under the default rules.",
 )
+@click.option(
+    "--shear-lag",
+    type=click.FloatRange(0.001, 1.0),
+    default=0.05,
+    show_default=True,
+    metavar="SIZES",
+    help="fracture.shear_lag of the runs that compare meshes.",
+)
 @options.output("Folder for independence.json, .csv and .png; without it nothing is written.")
 @options.overwrite
 @options.quiet
@@ -199,6 +207,7 @@ def independence(
     seeds: int,
     steps: int,
     solver: str,
+    shear_lag: float,
     output: Path | None,
     overwrite: bool,
     quiet: bool,
@@ -220,6 +229,7 @@ def independence(
             seeds=seeds,
             steps=steps,
             solver=solver,
+            shear_lag=shear_lag,
             progress=messages.progress,
             say=messages.log,
         )
