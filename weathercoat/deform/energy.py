@@ -25,6 +25,7 @@ from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.islands import label_islands
 from weathercoat.deform.parameters import Aim, DeformParameters
 from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
+from weathercoat.mesh.dihedral import bend_angle
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
@@ -232,7 +233,7 @@ def _gather_active(
                     target[a] = shrunk_bend(start[h], rate * (age - since[h]), floor)
                 angle_weight[a] = 0.5 * area * bending / (span[h] * span[h])
                 hinge_edge[a] = h
-                bend_at_rest[a] = hinge_bend(rest, origin[p1], origin[p2], origin[p3], origin[p4])
+                bend_at_rest[a] = bend_angle(rest, origin[p1], origin[p2], origin[p3], origin[p4])
                 a += 1
 
 
@@ -257,7 +258,7 @@ def _add_energy(
         strain = math.sqrt(x * x + y * y + z * z) / rest_length[i] - 1.0
         out[length_island[i]] += 0.5 * length_weight[i] * strain * strain
     for i in range(len(hinges)):
-        bend = hinge_bend(positions, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3])
+        bend = bend_angle(positions, hinges[i, 0], hinges[i, 1], hinges[i, 2], hinges[i, 3])
         error = bend - target[i]
         out[angle_island[i]] += 0.5 * angle_weight[i] * error * error
 
@@ -286,8 +287,7 @@ def _add_gradient(
         for k in range(4):
             j = unknown[hinges[i, k]]
             if j >= 0:
-                cu = -(1.0 - s) if k == 0 else (-s if k == 1 else (1.0 if k == 2 else 0.0))
-                cv = -(1.0 - t) if k == 0 else (-t if k == 1 else (0.0 if k == 2 else 1.0))
+                cu, cv = _shares(k, s, t)
                 _add(out, j, moment, cu * ux + cv * vx, cu * uy + cv * vy, cu * uz + cv * vz)
 
 
@@ -310,8 +310,7 @@ def _add_magnitudes(
         for k in range(4):
             j = unknown[hinges[i, k]]
             if j >= 0:
-                cu = -(1.0 - s) if k == 0 else (-s if k == 1 else (1.0 if k == 2 else 0.0))
-                cv = -(1.0 - t) if k == 0 else (-t if k == 1 else (0.0 if k == 2 else 1.0))
+                cu, cv = _shares(k, s, t)
                 x, y, z = cu * ux + cv * vx, cu * uy + cv * vy, cu * uz + cv * vz
                 out[j] += moment * math.sqrt(x * x + y * y + z * z)
 
@@ -432,23 +431,7 @@ def _hinge_gradient_change(
             g[1, axis] -= s * g[2 + face, axis]
             d[0, axis] += d_s * g[2 + face, axis] - (1.0 - s) * d[2 + face, axis]
             d[1, axis] -= d_s * g[2 + face, axis] + s * d[2 + face, axis]
-    return hinge_bend(positions, p1, p2, p3, p4)
-
-
-@formula
-def hinge_bend(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> float:
-    """The bend of a hinge [rad]; 0 where a face or the edge has no extent."""
-    ex, ey, ez = _difference(positions, p2, p1)
-    ax, ay, az = _difference(positions, p3, p1)
-    bx, by, bz = _difference(positions, p4, p1)
-    mx, my, mz = _cross(ex, ey, ez, ax, ay, az)
-    nx, ny, nz = _cross(bx, by, bz, ex, ey, ez)
-    tx, ty, tz = _cross(mx, my, mz, nx, ny, nz)
-    length = math.sqrt(ex * ex + ey * ey + ez * ez)
-    cosine = mx * nx + my * ny + mz * nz
-    if not (length > 0.0 and (mx * mx + my * my + mz * mz) > 0.0 and (nx * nx + ny * ny + nz * nz) > 0.0):
-        return 0.0
-    return math.atan2((tx * ex + ty * ey + tz * ez) / length, cosine)
+    return bend_angle(positions, p1, p2, p3, p4)
 
 
 HingeGradient = tuple[float, float, float, float, float, float, float, float, float]
@@ -475,6 +458,16 @@ def hinge_gradient(positions: Vectors, p1: int, p2: int, p3: int, p4: int) -> Hi
     cu, cv = -length / mm, -length / nn
     s, t = (ax * ex + ay * ey + az * ez) / ee, (bx * ex + by * ey + bz * ez) / ee
     return bend, cu * mx, cu * my, cu * mz, cv * nx, cv * ny, cv * nz, s, t
+
+
+@formula
+def _shares(corner: int, s: float, t: float) -> tuple[float, float]:
+    """What the gradients over the apexes, u and v, count for at a corner of a hinge; see `hinge_gradient`."""
+    if corner == 0:
+        return -(1.0 - s), -(1.0 - t)
+    if corner == 1:
+        return -s, -t
+    return (1.0, 0.0) if corner == 2 else (0.0, 1.0)
 
 
 @formula
