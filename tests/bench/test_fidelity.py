@@ -161,14 +161,15 @@ def test_one_seed_is_no_noise() -> None:
 def test_small_ways_beside_a_small_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fidelity, "HEIGHTS", (48, 24, 16, 12))
     done: list[tuple[int, int]] = []
-    reference, way = Way(600, 30, "newton"), Way(300, 15, "none")
-    found = bench_fidelity(ways=[way], reference=reference, progress=lambda n, total: done.append((n, total)))
-    assert done[-1] == (4, 4)
-    truth, other = found["ways"]
+    reference, ways = Way(600, 30, "newton"), [Way(300, 15, "none"), Way(300, 15, "sweeps", 10)]
+    found = bench_fidelity(ways=ways, reference=reference, progress=lambda n, total: done.append((n, total)))
+    assert done[-1] == (6, 6)
+    truth, other, curled = found["ways"]
+    assert not other["levels"] and curled["levels"], "only film that curls makes a level"
     assert truth["errors"]["areas"] == truth["errors"]["image"]["48"] == 0.0
     assert truth["errors"]["distance"] == pytest.approx(0.0, abs=1e-12)
     assert 0.0 < other["errors"]["image"]["48"] < 1.5 and other["errors"]["distance"] > 0.0
-    assert other["front"] and found["noise"]["distance"] > 0.0
+    assert other["front"] and curled["front"] and found["noise"]["distance"] > 0.0
     assert {level for way in found["ways"] for level in way["levels"]} == set(LEVELS)
     json.dumps(found, allow_nan=False)
 

@@ -213,7 +213,7 @@ def _find_levels(results: dict[str, Any]) -> dict[str, dict[str, Any]]:
     whose film curls; the one with the best picture where none is. Each level is dearer than the one before.
     """
     reference, *others = [row for row in results["ways"] if row["front"] and row["solver"] != "none"]
-    others.sort(key=_expected_seconds)
+    others = sorted(others, key=_expected_seconds) or [reference]
     found: dict[str, dict[str, Any]] = {}
     for name, height in zip(LEVELS, (HEIGHTS[-1], HEIGHTS[1], HEIGHTS[0]), strict=False):
         good = [row for row in others if _is_good(row["errors"], str(height), results)]
