@@ -338,12 +338,12 @@ def _add_hessian_product(
     g, d = np.empty((4, 3)), np.empty((4, 3))
     for i in range(len(hinges)):
         hinge = hinges[i]
-        bend = _hinge_gradient_change(positions, moving, hinge[0], hinge[1], hinge[2], hinge[3], g, d)
+        _hinge_gradient_change(positions, moving, hinge[0], hinge[1], hinge[2], hinge[3], g, d)
         turning = 0.0
         for k in range(4):
             for axis in range(3):
                 turning += g[k, axis] * moving[hinge[k], axis]
-        error = bend - target[i]
+        error = bend_angle(positions, hinge[0], hinge[1], hinge[2], hinge[3]) - target[i]
         for k in range(4):
             j = unknown[hinge[k]]
             if j >= 0:
@@ -387,8 +387,8 @@ def _add_bending_away(
 @kernel
 def _hinge_gradient_change(
     positions: Vectors, moving: Vectors, p1: int, p2: int, p3: int, p4: int, g: Vectors, d: Vectors
-) -> float:
-    """The gradient of the bend into g (4, 3), its change with the movement into d (4, 3); returns the bend.
+) -> None:
+    """The gradient of the bend into g (4, 3), its change with the movement into d (4, 3).
 
     Zeros where a face or the edge has no extent.
     """
@@ -400,7 +400,7 @@ def _hinge_gradient_change(
     nx, ny, nz = _cross(bx, by, bz, ex, ey, ez)
     ee, mm, nn = ex * ex + ey * ey + ez * ez, mx * mx + my * my + mz * mz, nx * nx + ny * ny + nz * nz
     if not (ee > _NO_EXTENT and mm > _NO_EXTENT and nn > _NO_EXTENT):
-        return 0.0
+        return
     length = math.sqrt(ee)
     dex, dey, dez = _difference(moving, p2, p1)
     dax, day, daz = _difference(moving, p3, p1)
@@ -431,7 +431,6 @@ def _hinge_gradient_change(
             g[1, axis] -= s * g[2 + face, axis]
             d[0, axis] += d_s * g[2 + face, axis] - (1.0 - s) * d[2 + face, axis]
             d[1, axis] -= d_s * g[2 + face, axis] + s * d[2 + face, axis]
-    return bend_angle(positions, p1, p2, p3, p4)
 
 
 HingeGradient = tuple[float, float, float, float, float, float, float, float, float]

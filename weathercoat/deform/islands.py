@@ -36,7 +36,7 @@ def _label(
     _join(unknown, hinges, parent)
     found = 0
     for i in range(len(parent)):
-        root = _root(parent, i)
+        root = find_root(parent, i)
         if root == i:  # a root is the first of its island
             island[i] = found
             found += 1
@@ -56,7 +56,7 @@ def _join(unknown: Indices, elements: Indices, parent: Indices) -> None:
             j = unknown[elements[i, k]]
             if j < 0:
                 continue
-            root = _root(parent, j)
+            root = find_root(parent, j)
             if first < 0:
                 first = root
             elif root < first:
@@ -67,7 +67,8 @@ def _join(unknown: Indices, elements: Indices, parent: Indices) -> None:
 
 
 @kernel
-def _root(parent: Indices, i: int) -> int:
+def find_root(parent: Indices, i: int) -> int:
+    """The root of i's tree in a union-find forest (k,); halves the path to it."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]

@@ -21,9 +21,10 @@ import numpy as np
 
 from weathercoat.compile import kernel
 from weathercoat.deform.constraints import Constraints
+from weathercoat.deform.islands import find_root
 from weathercoat.deform.runs import TILE, bucket
 from weathercoat.deform.seats import Seats, return_positions, seat_positions
-from weathercoat.deform.sleep import find_root, join_islands
+from weathercoat.deform.sleep import join_islands
 from weathercoat.deform.sweeps import sweep_angles, sweep_lengths, sweep_substrate
 from weathercoat.deform.team import Team
 from weathercoat.mesh.halfedge import HalfEdgeMesh

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.deform.constraints import Constraints, refresh_round, wake
+from weathercoat.deform.islands import find_root
 from weathercoat.deform.runs import LANES, Runs
 from weathercoat.deform.seats import let_be
 from weathercoat.mesh.halfedge import HalfEdgeMesh
@@ -124,12 +125,3 @@ def join_islands(runs: Runs, vertex: Indices, island: Indices) -> None:
                         island[max(one, root)] = min(one, root)
                         root = min(one, root)
                     one = root
-
-
-@kernel
-def find_root(island: Indices, v: int) -> int:
-    """The root of v's tree; halves the path to it."""
-    while island[v] != v:
-        island[v] = island[island[v]]
-        v = island[v]
-    return v
