@@ -12,11 +12,12 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all lint docs bench charts venv dev clean
+.PHONY: help demo test test-all fuzz lint docs bench charts venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
 	@echo "make test      run the tests (make test-all: the long ones too)"
+	@echo "make fuzz      read damaged files and configs for FUZZ_SECONDS=1200, from FUZZ_SEED (the date by default)"
 	@echo "make lint      style, types and import contracts"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
 	@echo "make bench     time it, and put the figures into the documentation"
@@ -50,6 +51,13 @@ test: dev
 
 test-all: dev
 	$(BIN)/python -m pytest --numprocesses auto -m "long or not long"
+
+# Another seed each day, so that nightly runs see other files; a failing case is written out with its seed.
+FUZZ_SECONDS ?= 1200
+FUZZ_SEED ?= $(shell date -u +%Y%m%d)
+
+fuzz: dev
+	$(BIN)/python -m tests.fuzz all --seconds $(FUZZ_SECONDS) --seed $(FUZZ_SEED)
 
 lint: dev
 	$(BIN)/ruff check .
