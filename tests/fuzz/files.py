@@ -1,0 +1,177 @@
+"""Damaged model files: each must be refused in one line, or come in as a whole surface that the file holds.
+
+`python -m tests.fuzz files --count 1000 --seed 1` judges 1000 files in one process under limits; a file that
+breaks the promise is written to `build/fuzz` and is judged again by `--replay PATH`, or by `--seed` and
+`--only` with its number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tests.fuzz import strict
+from tests.fuzz.mutations import mutate
+from tests.fuzz.seeds import Seed, make_seeds, real_seeds
+from tests.fuzz.workers import Verdict, Worker
+from weathercoat.errors import CorruptError, FormatError, WeathercoatError
+from weathercoat.mesh import topology
+from weathercoat.mesh.read import read_surface
+from weathercoat.mesh.surface import Surface
+
+_EXIT_CODES = (3, 4, 5)
+Case = tuple[str, bytes]  # extension, content
+
+
+def make_case(seeds: list[Seed], seed: int, number: int) -> Case:
+    """The damaged file of this number; the same for the same seeds and `seed`."""
+    random = np.random.default_rng([seed, number])
+    source = seeds[int(random.integers(len(seeds)))]
+    return source.extension, mutate(source, random)
+
+
+def judge(case: Case) -> Verdict:
+    """Read a file and compare what comes with what was promised and with the strict parser."""
+    extension, data = case
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"model.{extension}")
+        path.write_bytes(data)
+        try:
+            surface = read_surface(path)
+        except WeathercoatError as error:
+            return _judge_refusal(error, extension, data)
+    wrong = flaw_of_surface(surface) or _contradiction(surface, data)
+    return Verdict("violation", wrong) if wrong else Verdict("accepted", surface.format)
+
+
+def _judge_refusal(error: WeathercoatError, extension: str, data: bytes) -> Verdict:
+    line = error.line()
+    if "\n" in line or len(line) > 500 or not line.isprintable():
+        return Verdict("violation", f"not one clear line: {line[:300]!r}")
+    if error.exit_code not in _EXIT_CODES:
+        return Verdict("violation", f"exit code {error.exit_code}: {line[:300]}")
+    return Verdict("refused", error.code)
+
+
+def flaw_of_surface(surface: Surface) -> str | None:
+    """What is wrong with a surface that reading should have made whole; None for nothing."""
+    vertices, faces = surface.vertices, surface.faces
+    if not len(faces):
+        return "no faces"
+    values = [vertices, *(v for v in (surface.uv, surface.colors) if v is not None)]
+    if not all(np.isfinite(v).all() for v in values):
+        return "not finite"
+    if not np.array_equal(np.unique(faces), np.arange(len(vertices))):
+        return "an index is out of range, or a vertex unused"
+    if len(surface.face_group) != len(faces) or not surface.face_group.max() < len(surface.groups):
+        return "a group that does not exist"
+    if not (surface.face_areas() > 0).all():
+        return "a face without area"
+    twin, crowded = topology.match_twins(vertices, faces)
+    _, parent = topology.split_vertices(len(vertices), faces, twin)
+    if len(crowded) or len(parent) > len(vertices):
+        return "not manifold"
+    orientation = topology.orient(vertices, faces, twin)
+    return "not oriented" if orientation.cut or orientation.flipped.any() else None
+
+
+def _contradiction(surface: Surface, data: bytes) -> str | None:
+    """How the strict parser contradicts an accepted file; None where it does not."""
+    try:
+        content = strict.parse(data, surface.format)
+    except strict.BrokenError as broken:
+        return f"accepted as {surface.format}, though broken: {broken}"
+    if content is None:
+        return None
+    notes = {note.code for note in surface.notes}
+    for flaw in content.flaws:
+        if not notes & set(flaw.notes):
+            return f"accepted as {surface.format} without {' or '.join(flaw.notes)}, though {flaw.why}"
+    if len(surface.faces) > content.triangles:
+        return f"{len(surface.faces)} faces of a file with {content.triangles} triangles"
+    if content.points is not None and not content.points.issuperset(map(tuple, surface.vertices.tolist())):
+        return "a position that the file does not hold"
+    return None
+
+
+def _is_too_strict(case: Case, verdict: Verdict) -> bool:
+    """Whether a file was called corrupt that the strict parser finds well-formed; no violation, but worth a
+    look."""
+    if verdict.what not in (CorruptError.code, FormatError.code):
+        return False
+    try:
+        content = strict.parse(case[1], case[0])
+    except strict.BrokenError:
+        return False
+    return content is not None and content.triangles > 0
+
+
+def run(
+    count: int | None, seed: int, *, seconds: float | None = None, seeds: list[Seed] | None = None
+) -> tuple[Counter[str], list[tuple[int, Case, Verdict]]]:
+    """Judge `count` cases, or as many as `seconds` allow: how often each outcome, and the violations."""
+    seeds = make_seeds() if seeds is None else seeds
+    outcomes: Counter[str] = Counter()
+    violations = []
+    end = None if seconds is None else time.monotonic() + seconds
+    with Worker(judge, (seeds[0].extension, seeds[0].data)) as worker:
+        for number in _numbers(count):
+            if end is not None and time.monotonic() > end:
+                break
+            case = make_case(seeds, seed, number)
+            verdict = worker.judge(case)
+            outcomes[f"{verdict.kind} {verdict.what}" if verdict.kind != "violation" else "violation"] += 1
+            if verdict.kind == "violation":
+                violations.append((number, case, verdict))
+    return outcomes, violations
+
+
+def _numbers(count: int | None) -> Iterator[int]:
+    number = 0
+    while count is None or number < count:
+        yield number
+        number += 1
+
+
+def main(arguments: list[str]) -> int:
+    """The command; returns the number of violations."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz files", description=__doc__)
+    parser.add_argument("--count", type=int, help="files; without it, as many as --seconds allow")
+    parser.add_argument("--seconds", type=float, help="stop after so long")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", type=int, help="judge only the file of this number")
+    parser.add_argument("--replay", type=Path, help="judge this file, as it is")
+    parser.add_argument("--output", type=Path, default=Path("build/fuzz"), help="folder of what is found")
+    options = parser.parse_args(arguments)
+    if options.replay is not None:
+        print(judge((options.replay.suffix[1:], options.replay.read_bytes())))
+        return 0
+    seeds = make_seeds() + real_seeds()
+    if options.only is not None:
+        case = make_case(seeds, options.seed, options.only)
+        path = _write(options.output, options.seed, options.only, case)
+        print(f"{path}: {judge(case)}")
+        return 0
+    if options.count is None and options.seconds is None:
+        parser.error("give --count or --seconds")
+    start = time.monotonic()
+    outcomes, violations = run(options.count, options.seed, seconds=options.seconds, seeds=seeds)
+    for number, case, verdict in violations:
+        print(f"{_write(options.output, options.seed, number, case)}: {verdict.what}")
+    print(f"{outcomes.total()} files from {len(seeds)} seeds in {time.monotonic() - start:.0f} s")
+    for outcome, times in sorted(outcomes.items()):
+        print(f"{times:8d} {outcome}")
+    return len(violations)
+
+
+def _write(folder: Path, seed: int, number: int, case: Case) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{seed}-{number}.{case[0]}"
+    path.write_bytes(case[1])
+    return path
