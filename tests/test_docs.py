@@ -18,8 +18,10 @@ import pytest
 from weathercoat import errors
 from weathercoat.cli.handler import call
 from weathercoat.cli.root import weathercoat
+from weathercoat.cli.signals import Stopped
 from weathercoat.config.presets import preset_names
 from weathercoat.config.schema import parameters
+from weathercoat.notes import MEANINGS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -219,9 +221,18 @@ def test_every_parameter_has_a_picture_or_a_reason(making: ModuleType) -> None:
 
 
 def test_every_code_is_explained(making: ModuleType) -> None:
-    sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "weathercoat").rglob("*.py"))
-    assert set(re.findall(r"\"(W-[A-Z]+(?:-[A-Z]+)*)\"", sources)) == set(making.WARNINGS)
+    files = set((ROOT / "weathercoat").rglob("*.py"))
+    table, classes = ROOT / "weathercoat" / "notes.py", ROOT / "weathercoat" / "errors.py"
     page = (DOCS / "errors.md").read_text(encoding="utf-8")
+    for letter, origin, inside in (("W", table, files - {table}), ("E", classes, {classes})):
+        code = rf"\b{letter}-[A-Z]+(?:-[A-Z]+)*\b"
+        used = {found for path in inside for found in re.findall(f'"({code})"', path.read_text("utf-8"))}
+        explained = set(re.findall(rf"^\| `({code})` \|", page, re.MULTILINE))
+        assert used == explained, origin
+    assert set(MEANINGS) == set(re.findall(r"^\| `(W-[A-Z-]+)` \|", page, re.MULTILINE))
+    exits = {int(number) for number in re.findall(r"^\| (\d+) \|", page, re.MULTILINE)}
+    assert exits >= {error.exit_code for error in making.coded_errors()}
+    assert exits >= {kind.exit_code for kind in Stopped.__subclasses__()}
     for error in making.coded_errors():
         assert f"| `{error.code}` | {error.exit_code} |" in page
     assert len(making.coded_errors()) >= len(errors.WeathercoatError.__subclasses__()) - 2

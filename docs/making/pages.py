@@ -12,6 +12,7 @@ from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
 from weathercoat.config.presets import preset_names, preset_path, preset_purpose
 from weathercoat.config.schema import parameters
+from weathercoat.notes import MEANINGS
 
 _ABOUT_PICTURES = f"""\
 This page is made by `make docs`: the tables from the schema, the pictures by ageing a plate or a bracket of
@@ -29,10 +30,11 @@ _ABOUT_ERRORS = """\
 This page is made by `make docs`. The codes are stable: scripts may rely on them.
 
 A message is one line on standard error, `weathercoat: FILE: CODE: what; what to do`, and one for each
-problem of a config, `weathercoat: FILE:LINE: E-CONFIG: key: what`. With `--json` an error is an object under
-`"error"` with the keys `code`, `exit_code`, `file`, `message` and `remedy`. Notes (`W-...`) carry the
-number of elements that they concern and do not change the exit code; `run.json` lists them too. `--strict`
-makes the first one an error.
+problem of a config, `weathercoat: FILE:LINE: E-CONFIG: key: what`. With `--json`, which every command takes,
+an error is an object under `"error"` with the keys `code`, `exit_code`, `file`, `message` and `remedy`; a
+traceback is printed only with `--debug`. Notes (`W-...`) go to standard error too, carry the number of
+elements that they concern and do not change the exit code; `run.json` lists them. `--strict` makes the first
+one an error.
 """
 
 _ABOUT_GALLERY = """\
@@ -81,78 +83,11 @@ _EXIT_CODES = {
     5: "over a limit of size, faces or memory",
     6: "the tool's own result failed its checks; nothing was written",
     7: "the output cannot be written, or exists",
+    8: "reserved for batches: some assets failed, the others are kept",
     70: "internal error: please report it",
     130: "interrupted (Ctrl-C); nothing half-written is left",
     141: "whoever read the standard output went away, as `head` does",
     143: "terminated; nothing half-written is left",
-}
-
-# Code, what it says, what to do about it. A test compares the codes with those in the sources.
-WARNINGS = {
-    "W-ANIMATION": (
-        "The file has animations, which are not kept.",
-        "Nothing; export the wanted pose if it matters.",
-    ),
-    "W-ANGLES": (
-        "Remeshed faces have an angle under 10 degrees: creases or rims are closer than edges.",
-        "Ask for more faces, or raise `remesh.crease_angle`.",
-    ),
-    "W-BADINDEX": (
-        "Faces with an index that the format does not allow (0 in OBJ, negative in PLY) were dropped.",
-        "Export again if parts are missing.",
-    ),
-    "W-BOUNDARY": (
-        "The surface has open edges. Film ends there: a boundary never cracks, and counts as broken.",
-        "Nothing for sheets; close the holes of what should be solid.",
-    ),
-    "W-COMPONENTS": ("The model has several pieces that are not connected.", "Nothing; all of them age."),
-    "W-DEGENERATE": ("Faces without an area were removed.", "Nothing."),
-    "W-DUPLICATE": ("Faces on the same vertices as another were dropped.", "Nothing."),
-    "W-FACES": (
-        "The remeshed surface missed the wanted number of faces by over 2 %.",
-        "Ask for more faces, or raise `remesh.crease_angle`: many creases or pieces need many faces.",
-    ),
-    "W-FLIPPED": ("Faces that looked the other way than their neighbours were turned.", "Nothing."),
-    "W-FORMAT": (
-        "The content is of another format than the extension says; the content decided.",
-        "Rename the file.",
-    ),
-    "W-GROUP": (
-        "Names of `paint.only` or `paint.except` fit no material group or object.",
-        "Compare them with the groups that `weathercoat inspect` lists.",
-    ),
-    "W-INVERTED": ("Closed pieces that were inside out were turned.", "Nothing."),
-    "W-KEPT": (
-        "Pieces too small for the wanted edge length kept their own triangles.",
-        "Nothing; ask for more faces if they matter.",
-    ),
-    "W-MATERIAL": (
-        "A material library or a picture is not beside the model.",
-        "Put it there if `paint.only` or `paint.except` need the names of materials.",
-    ),
-    "W-MORPH": ("The file has morph targets, which are not kept.", "Export the wanted shape."),
-    "W-NONFINITE": (
-        "Vertices with infinite or undefined positions were dropped with their faces.",
-        "Export again.",
-    ),
-    "W-NONMANIFOLD": ("Edges of more than two faces were split, so that the film is a sheet.", "Nothing."),
-    "W-NONMANIFOLD-VERTEX": ("Vertices where pieces only touch were split.", "Nothing."),
-    "W-NONORIENTABLE": (
-        "A piece has only one side, as a Möbius strip has, and was cut open along some edges.",
-        "Nothing, unless the cut shows.",
-    ),
-    "W-POLYGONS": ("Polygons with more than three corners were triangulated.", "Nothing."),
-    "W-SELFINT": ("Faces cut through others; looked for by `inspect --self-intersections` only.", "Nothing."),
-    "W-SKIN": (
-        "A skinned mesh was read as it is modelled, without its pose.",
-        "Export the pose as a plain mesh.",
-    ),
-    "W-SOUP": (
-        "Most faces share no edge with another, so that the film cannot hang together.",
-        "Merge vertices in a modelling program.",
-    ),
-    "W-UNREFERENCED": ("Vertices that no face uses were dropped.", "Nothing."),
-    "W-WELDED": ("Vertices at the same position were merged.", "Nothing."),
 }
 
 
@@ -196,7 +131,7 @@ def errors_page() -> str:
     lines += [f"| `{e.code}` | {e.exit_code} | {_summary(e)} | {e.remedy} |" for e in coded_errors()]
     lines += ["", "The message itself is often more particular than this table.", ""]
     lines += ["## Notes", "", "| code | what it means | what to do |", "|---|---|---|"]
-    lines += [f"| `{code}` | {what} | {remedy} |" for code, (what, remedy) in sorted(WARNINGS.items())]
+    lines += [f"| `{code}` | {what} | {remedy} |" for code, (what, remedy) in MEANINGS.items()]
     return "\n".join(lines) + "\n"
 
 

@@ -7,9 +7,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from weathercoat import __version__
@@ -65,23 +67,57 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
         assert f"  {name} " in commands
 
 
+def commands_below(command: click.Command, name: str) -> Iterator[tuple[str, click.Command]]:
+    """A command and all below it, by name."""
+    yield name, command
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for child in command.list_commands(context):
+            found = command.get_command(context, child)
+            assert found is not None
+            yield from commands_below(found, f"{name} {child}")
+
+
 def test_every_option_has_help() -> None:
-    import click
-
-    context = click.Context(root.weathercoat)
-
-    def check(command: click.Command, name: str) -> None:
+    for name, command in commands_below(root.weathercoat, "weathercoat"):
         assert command.help, name
         for parameter in command.params:
             if isinstance(parameter, click.Option):
                 assert parameter.help, f"{name} {parameter.name}"
-        if isinstance(command, click.Group):
-            for child in command.list_commands(context):
-                found = command.get_command(context, child)
-                assert found is not None
-                check(found, f"{name} {child}")
 
-    check(root.weathercoat, "weathercoat")
+
+def test_every_command_tells_its_errors_as_json_and_with_a_traceback() -> None:
+    for name, command in commands_below(root.weathercoat, "weathercoat"):
+        if not isinstance(command, click.Group):
+            flags = {flag for parameter in command.params for flag in parameter.opts}
+            assert {"--json", "--debug"} <= flags, name
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["config", "list"],
+        ["config", "new"],
+        ["config", "new", "made.yaml"],
+        ["config", "schema"],
+        ["completion", "bash"],
+        ["sample", "sign"],
+        ["sample", "sign", "-o", "made.ply"],
+    ],
+)
+def test_results_as_json_are_one_object(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert call([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)
+    assert call([*arguments, "--json", "--frob"]) == 2
+    assert json.loads(capsys.readouterr().err)["error"]["code"] == "E-USAGE"
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_config_and_model_the_other_way_round(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for config in ("standard", "my.yaml"):
+        assert call([command, "sign.obj", config]) == 2
+        told = f"{config} is a config, and CONFIG comes before MODEL; say {config} sign.obj"
+        assert capsys.readouterr().err == f"weathercoat: E-USAGE: {told}\n"
 
 
 def test_run_hands_over_what_was_asked(asked: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:

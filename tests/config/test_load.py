@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -72,11 +74,35 @@ def test_remesh_off_and_back_on(write: Callable[[str], str]) -> None:
     assert off.config.remesh is False
     assert off.origins["remesh"] == "c.yaml:1"
     assert not any(key.startswith("remesh.") for key in off.origins)
-    on = load_config("c.yaml", [Override("remesh.faces", 500, "--faces")])
+    on = load_config("c.yaml", ["remesh=on", Override("remesh.faces", 500, "--faces")])
     assert on.config.remesh == Remesh(faces=500)
     assert on.origins["remesh.faces"] == "--faces"
     assert on.origins["remesh.crease_angle"] == "default"
     assert load_config("standard", ["remesh=off"]).config.remesh is False
+
+
+@pytest.mark.parametrize("off", ["off", "false", "no"])
+def test_a_part_of_what_is_off_does_not_switch_it_on(write: Callable[[str], str], off: str) -> None:
+    path = write(f"remesh: {off}\n")
+    with pytest.raises(ConfigError) as raised:
+        load_config(path, [Override("remesh.faces", 500, "--faces")])
+    assert raised.value.lines() == [
+        "--faces: E-CONFIG: remesh.faces: remesh is off by c.yaml:1; add --set remesh=on, or leave this out"
+    ]
+    assert load_config(path, ["remesh={faces: 500}"]).config.remesh == Remesh(faces=500)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_config_from_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    keeper = os.open(pipe, os.O_RDWR)
+    try:
+        threading.Timer(0.1, lambda: (os.write(keeper, b"seed: 7\n"), os.close(keeper))).start()
+        assert load_config(str(pipe)).config.seed == 7
+    finally:
+        with suppress(OSError):
+            os.close(keeper)
 
 
 def test_a_later_layer_may_choose_steps_over_count(write: Callable[[str], str]) -> None:
@@ -178,7 +204,7 @@ def test_files_that_are_none(write: Callable[[str], str], tmp_path: Path) -> Non
     assert "cannot be read" in problems("a\0b")[0]
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        assert "not a regular file" in problems(str(tmp_path / "pipe"))[0]
+        assert "nobody writes to this pipe" in problems(str(tmp_path / "pipe"))[0]
 
 
 @pytest.mark.parametrize("name", preset_names())

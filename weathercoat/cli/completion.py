@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
+
 import click
+
+from weathercoat.cli import options
 
 
 @click.command()
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
-def command(shell: str) -> None:
+@options.as_json
+@options.debug
+def command(shell: str, as_json: bool) -> None:
     """Print the completion script of SHELL.
 
     \b
@@ -23,4 +29,5 @@ def command(shell: str) -> None:
     kind = get_completion_class(shell)
     if kind is None:
         raise click.UsageError(f"this version of Click has no completion for {shell}")
-    click.echo(kind(weathercoat, {}, PROGRAM, COMPLETION_VARIABLE).source())
+    script = kind(weathercoat, {}, PROGRAM, COMPLETION_VARIABLE).source()
+    click.echo(json.dumps({"script": script}, ensure_ascii=False) if as_json else script)

@@ -9,7 +9,7 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.config.presets import preset_names, preset_purpose
-from weathercoat.errors import ConfigError, ConfigProblem
+from weathercoat.errors import ConfigError, ConfigProblem, UsageError
 
 
 @click.group()
@@ -18,8 +18,14 @@ def command() -> None:
 
 
 @command.command("list")
-def list_configs() -> None:
+@options.as_json
+@options.debug
+def list_configs(as_json: bool) -> None:
     """Name the shipped configs and say what each is for."""
+    if as_json:
+        purposes = {name: preset_purpose(name) for name in preset_names()}
+        click.echo(json.dumps({"configs": purposes}, indent=2, ensure_ascii=False))
+        return
     width = max(map(len, preset_names()))
     for name in preset_names():
         click.echo(f"{name:{width}}  {preset_purpose(name)}")
@@ -31,8 +37,9 @@ def list_configs() -> None:
     "--from", "preset", type=click.Choice(preset_names()), help="Take the values of a shipped config."
 )
 @options.overwrite
+@options.as_json
 @options.debug
-def new_config(file: Path | None, preset: str | None, overwrite: bool) -> None:
+def new_config(file: Path | None, preset: str | None, overwrite: bool, as_json: bool) -> None:
     """Write a commented config to start from, to FILE or standard output."""
     from weathercoat.config.describe import example_yaml
 
@@ -43,12 +50,14 @@ def new_config(file: Path | None, preset: str | None, overwrite: bool) -> None:
 
         text = example_yaml(load_config(preset).config, f"# {preset_purpose(preset)}.\n")
     if file is None:
-        click.echo(text, nl=False)
+        click.echo(json.dumps({"yaml": text}, ensure_ascii=False) if as_json else text, nl=as_json)
         return
     from weathercoat.output.folder import whole_file
 
     with whole_file(file, overwrite=overwrite) as stream:
         stream.write(text.encode())
+    if as_json:
+        click.echo(json.dumps({"written": str(file)}, ensure_ascii=False))
 
 
 @command.command("show")
@@ -71,11 +80,14 @@ def show_config(config: str, assignments: tuple[str, ...], as_json: bool) -> Non
 
 @command.command("schema")
 @click.option("--markdown", is_flag=True, help="Print the reference of all keys in Markdown instead.")
+@options.as_json
 @options.debug
-def print_schema(markdown: bool) -> None:
+def print_schema(markdown: bool, as_json: bool) -> None:
     """Print the JSON Schema of a config, for editors."""
     from weathercoat.config.describe import json_schema, reference_markdown
 
+    if markdown and as_json:
+        raise UsageError("--markdown and --json exclude each other", remedy="give one of them")
     if markdown:
         click.echo(reference_markdown(), nl=False)
     else:

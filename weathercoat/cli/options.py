@@ -11,6 +11,7 @@ from click.shell_completion import CompletionItem
 
 from weathercoat.config.presets import preset_names
 from weathercoat.config.quality import AUTO, LEVELS
+from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
     from weathercoat.config.load import Override
@@ -86,6 +87,20 @@ def shortcuts(**values: object) -> Iterator[Override]:
     for option, value in values.items():
         if value is not None:
             yield Override(keys[option], value, f"--{option}")
+
+
+def require_config_first(config: str, model: str) -> None:
+    """Raise UsageError where CONFIG and MODEL are plainly the other way round."""
+
+    def is_config(name: str) -> bool:
+        return Path(name).suffix.lower() in (".yaml", ".yml") or (
+            name in preset_names() and not Path(name).exists()
+        )
+
+    if is_config(model) and not is_config(config):
+        raise UsageError(
+            f"{model} is a config, and CONFIG comes before MODEL", remedy=f"say {model} {config}"
+        )
 
 
 def output(what: str, *, required: bool = False) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -42,6 +42,8 @@ def command(
     if len(config_and_model) > 2:
         raise UsageError("plan takes one config and one model", remedy="see `weathercoat plan --help`")
     *configs, model = config_and_model
+    for config in configs:
+        options.require_config_first(config, model)
     shortcuts = options.shortcuts(quality=quality, steps=steps, faces=faces)
     loaded = load_config(configs[0] if configs else "standard", [*assignments, *shortcuts])
     with Messages(quiet=as_json) as messages, report_compiling(messages.log), name_errors(model):

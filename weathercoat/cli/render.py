@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from weathercoat.cli import options
+from weathercoat.cli.writing import say_written
 from weathercoat.errors import CorruptError, UsageError
 
 if TYPE_CHECKING:
@@ -27,8 +28,11 @@ if TYPE_CHECKING:
 @click.option("--azimuth", type=float, metavar="DEGREES", help="Turn of the view about the model.")
 @click.option("--elevation", type=click.FloatRange(-89, 89), metavar="DEGREES", help="Height of the view.")
 @options.overwrite
+@options.as_json
 @options.debug
-def command(run: Path, output: Path, step: int | None, overwrite: bool, **view: float | None) -> None:
+def command(
+    run: Path, output: Path, step: int | None, overwrite: bool, as_json: bool, **view: float | None
+) -> None:
     """Draw RUN, the folder of a finished run or its folder of snapshots, as a PNG."""
     from weathercoat.cli.messages import Messages
     from weathercoat.output.folder import whole_file
@@ -36,13 +40,13 @@ def command(run: Path, output: Path, step: int | None, overwrite: bool, **view: 
     from weathercoat.run import report_compiling
 
     with (
-        Messages(quiet=False) as messages,
+        Messages(quiet=as_json) as messages,
         report_compiling(messages.log),
         whole_file(output, overwrite=overwrite) as stream,
     ):
         image = _draw(run, step, {name: value for name, value in view.items() if value is not None})
         write_png(stream, image)  # type: ignore[arg-type]
-    click.echo(f"written to {output}")
+    say_written(output, as_json=as_json)
 
 
 def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:

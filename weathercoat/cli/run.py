@@ -61,6 +61,7 @@ def command(
 
     if output == Path("-"):
         raise UsageError("the results are a folder, not a stream", remedy="name the folder with -o")
+    options.require_config_first(config, model)
     loaded = load_config(
         config, [*assignments, *options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)]
     )

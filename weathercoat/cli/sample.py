@@ -34,7 +34,9 @@ def command() -> None:
 
 
 def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
-    def write(output: Path | None, size: float | None, overwrite: bool, **arguments: float) -> None:
+    def write(
+        output: Path | None, size: float | None, overwrite: bool, as_json: bool, **arguments: float
+    ) -> None:
         path = output or Path(f"{name}.obj")
         surface = make(**arguments)
         if size is not None:
@@ -42,10 +44,10 @@ def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
             surface = replace(surface, vertices=surface.vertices * (size / extent))
         with open_mesh(path, overwrite=overwrite) as write_surface:
             write_surface(surface)
-        say_written(path)
+        say_written(path, as_json=as_json)
 
     annotated = get_type_hints(make, include_extras=True)
-    write = options.debug(options.overwrite(write))
+    write = options.debug(options.as_json(options.overwrite(write)))
     write = click.option(
         "--size",
         type=click.FloatRange(1e-9, 1e9),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -38,9 +39,11 @@ def open_mesh(output: Path, *, overwrite: bool) -> Iterator[Callable[[Surface], 
         yield partial(_write, stream, kind)
 
 
-def say_written(output: Path, *about: str) -> None:
+def say_written(output: Path, *about: str, as_json: bool = False) -> None:
     """Say on standard output that the file is there; nothing where standard output is the file."""
-    if output != STANDARD_OUTPUT:
+    if output != STANDARD_OUTPUT and as_json:
+        click.echo(json.dumps({"written": str(output)}, ensure_ascii=False))
+    elif output != STANDARD_OUTPUT:
         click.echo(f"written to {output}" + ": " * bool(about) + ", ".join(about))
 
 

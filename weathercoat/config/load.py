@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +24,7 @@ from weathercoat.errors import ConfigError, ConfigProblem
 
 DEFAULT = "default"
 _ALTERNATIVES = (("snapshots", "count", "steps"),)
+_OFF = (False, "off", "no")
 
 
 class Override(NamedTuple):
@@ -59,6 +61,7 @@ class _Origin(NamedTuple):
 class _Layer(NamedTuple):
     values: dict[str, Item]
     where: str
+    key: str = ""  # of an override
 
 
 def load_config(
@@ -134,7 +137,10 @@ def _preset_layer(name: str) -> _Layer:
 
 def _read_file(source: str) -> bytes:
     try:
-        if not stat.S_ISREG(Path(source).stat().st_mode):
+        mode = Path(source).stat().st_mode
+        if stat.S_ISFIFO(mode):
+            return _read_pipe(source)
+        if not stat.S_ISREG(mode):
             raise ConfigError.at(source, "not a regular file; give a YAML file")
         with Path(source).open("rb") as file:
             return file.read(LARGEST_FILE + 1)
@@ -147,6 +153,21 @@ def _read_file(source: str) -> bytes:
         raise ConfigError.at(source, f"cannot be read: {reason}") from None
 
 
+def _read_pipe(source: str) -> bytes:
+    """What a pipe holds, such as that of the shell's `<(...)`; refuses one that nobody writes to, which would
+    block for ever.
+    """
+    descriptor = os.open(source, os.O_RDONLY | os.O_NONBLOCK)
+    with os.fdopen(descriptor, "rb") as file:
+        start = b""
+        with suppress(BlockingIOError):  # somebody is about to write
+            start = os.read(descriptor, 1)
+            if not start:
+                raise ConfigError.at(source, "nobody writes to this pipe; give a YAML file")
+        os.set_blocking(descriptor, True)
+        return start + file.read(LARGEST_FILE + 1)
+
+
 def _override_layer(override: str | Override) -> _Layer:
     if isinstance(override, str):
         key, sign, text = override.partition("=")
@@ -156,7 +177,7 @@ def _override_layer(override: str | Override) -> _Layer:
     item = Item(override.value, 0)
     for name in reversed(override.key.split(".")):
         item = Item({name: item}, 0)
-    return _Layer(item.value, override.option)
+    return _Layer(item.value, override.option, override.key)
 
 
 def _wanted_presets(layers: Iterable[_Layer]) -> list[tuple[str, _Origin]]:
@@ -179,6 +200,13 @@ class _Merge:
         self.problems: list[ConfigProblem] = []
 
     def add(self, layer: _Layer) -> None:
+        """Add a layer. An option that sets a part of what is switched off does not switch it on."""
+        whole, _, part = layer.key.partition(".")
+        if part and self.values.get(whole) in _OFF:
+            origin = self.origins[(whole,)]
+            what = f"{whole} is off by {origin}; add --set {whole}=on, or leave this out"
+            self.problems.append(ConfigProblem(layer.where, 0, layer.key, what))
+            return
         for section, *keys in _ALTERNATIVES:
             item, before = layer.values.get(section), self.values.get(section)
             if item is None or not isinstance(item.value, dict) or not isinstance(before, dict):

@@ -4,6 +4,7 @@ object's size.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,23 +121,29 @@ def make_display_mesh(
     rest = normalise(snapshot.substrate_vertices)
     parts = [_metal(snapshot, rest, metal_thickness)]
     if len(snapshot.film_faces):
-        parts += _film(snapshot, normalise(snapshot.film_vertices), rest, film_thickness, paint)
+        parts.append(_film(snapshot, normalise(snapshot.film_vertices), rest, film_thickness, paint))
     if untouched is not None and len(untouched.faces):
-        parts.append(_part(normalise(untouched.vertices), untouched.faces, BARE_PART, _METAL_CREASE))
+        bare = ((untouched.faces, BARE_PART),)
+        parts.append(_part(normalise(untouched.vertices), bare, _METAL_CREASE))
     return _joined(parts)
 
 
 def _part(
-    vertices: Vectors, faces: Indices, kind: int, crease: float, scalars: dict[str, Vectors] | None = None
+    vertices: Vectors,
+    surfaces: Sequence[tuple[Indices, int]],
+    crease: float,
+    scalars: dict[str, Vectors] | None = None,
 ) -> DisplayMesh:
-    """A mesh of one kind; what `scalars` does not give is 0, and the rest position that of the vertices."""
+    """A mesh of faces of several kinds, whose normals do not mix, on the same vertices; what `scalars` does
+    not give is 0, and the rest position that of the vertices.
+    """
     given = scalars or {}
     zero = np.zeros(len(vertices))
     return DisplayMesh(
         vertices=vertices,
-        faces=np.asarray(faces, np.int32),
-        kind=np.full(len(faces), kind, np.uint8),
-        corner_normals=corner_normals(vertices, faces, crease),
+        faces=np.concatenate([faces for faces, _ in surfaces]).astype(np.int32, copy=False),
+        kind=np.concatenate([np.full(len(faces), kind, np.uint8) for faces, kind in surfaces]),
+        corner_normals=np.concatenate([corner_normals(vertices, faces, crease) for faces, _ in surfaces]),
         rest=given.get("rest", vertices),
         stain=given.get("stain", zero),
         dust=given.get("dust", zero),
@@ -151,17 +158,17 @@ def _metal(snapshot: Snapshot, rest: Vectors, thickness: float) -> DisplayMesh:
     scalars = {"dust": snapshot.dust, "rust": snapshot.substrate_rust, "rest": rest}
     faces = snapshot.substrate_faces
     if thickness <= 0.0 or len(open_edges(faces)[0]) == 0:
-        return _part(rest, faces, METAL, _METAL_CREASE, scalars)
+        return _part(rest, ((faces, METAL),), _METAL_CREASE, scalars)
     shell = make_shell(rest, faces, thickness, gap=-thickness)
     doubled = {name: np.concatenate([value, value]) for name, value in scalars.items()}
     doubled["rest"] = shell.vertices
     everything = np.concatenate([shell.front, shell.back, shell.rim])
-    return _part(shell.vertices, everything, METAL, _METAL_CREASE, doubled)
+    return _part(shell.vertices, ((everything, METAL),), _METAL_CREASE, doubled)
 
 
 def _film(
     snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors
-) -> list[DisplayMesh]:
+) -> DisplayMesh:
     """Front, back and rim of the film."""
     thickness = max(thickness, _LEAST_THICKNESS)
     origin = snapshot.film_origin
@@ -181,11 +188,11 @@ def _film(
         "color": np.tile(color, (2, 1)),
     }
     surfaces = ((shell.front, FRONT), (shell.back, BACK), (shell.rim, RIM))
-    return [_part(shell.vertices, faces, kind, _FILM_CREASE, scalars) for faces, kind in surfaces]
+    return _part(shell.vertices, surfaces, _FILM_CREASE, scalars)
 
 
 def _joined(parts: list[DisplayMesh]) -> DisplayMesh:
-    """One mesh of several; parts that share one array of vertices are simply repeated."""
+    """One mesh of several."""
     offsets = np.concatenate([[0], np.cumsum([len(part.vertices) for part in parts])])
     faces = [part.faces + np.int32(offset) for part, offset in zip(parts, offsets, strict=False)]
 
