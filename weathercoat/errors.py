@@ -229,6 +229,13 @@ class OutputExistsError(OutputError):
     remedy = "choose another folder with -o, or give --overwrite"
 
 
+class ResumeError(OutputError):
+    """What lies at the output is no part of the run that is asked for, so that it cannot go on from there."""
+
+    code = "E-RESUME"
+    remedy = "choose another folder with -o, or begin anew with --overwrite"
+
+
 @dataclass(frozen=True)
 class Note:
     """Something that was repaired, dropped or cannot be kept; listed in `run.json` and on standard error.

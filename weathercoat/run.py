@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
-import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict, dataclass, fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -23,48 +22,37 @@ from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import read_stream, read_surface
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
-from weathercoat.output import folder as run_folder
-from weathercoat.output.camera import Camera
+from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
+from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder
 from weathercoat.output.meshes import write_mesh
-from weathercoat.output.pictures import (
-    Image,
-    PictureParameters,
-    contact_sheet,
-    frame_camera,
-    render_snapshot,
-    write_png,
-)
-from weathercoat.output.report import (
-    make_report,
-    make_timing,
-    measure_snapshot,
-    measure_surface,
-    sha256,
-    write_json,
-)
-from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
-from weathercoat.plan import make_plan
-from weathercoat.sim.recorders import Recorder, run_simulation
+from weathercoat.output.report import make_report, make_timing, measure_surface, sha256, write_json
+from weathercoat.plan import Plan, make_plan
+from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
+from weathercoat.resume import identify, read_finished, recorded_figures, take_up
+from weathercoat.sim.recorders import Patience, Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
-from weathercoat.sim.snapshot import Snapshot
 from weathercoat.stain.color import Palette
 from weathercoat.stain.rust import StainParameters
 
 _Parameters = TypeVar("_Parameters", FilmParameters, DeformParameters, StainParameters)
+_AROUND = ("read", "remesh", "prepare", "checkpoint", "write", "pictures")  # what is timed beside the steps
 
 
-@dataclass
-class Stopwatch:
-    """Seconds by name."""
+@dataclass(frozen=True)
+class _Intake:
+    """A model that was taken in: its surface, the parts with and without paint, SHA-256 by file name, and
+    the plan of its run.
+    """
 
-    seconds: dict[str, float] = field(default_factory=dict)
+    surface: Surface
+    painted: Surface
+    untouched: Surface | None
+    inputs: dict[str, str]
+    plan: Plan
 
-    @contextmanager
-    def time(self, name: str) -> Iterator[None]:
-        """Add the time that the block takes to `name`."""
-        started = time.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+    @property
+    def name(self) -> str:
+        return next(iter(self.inputs))
 
 
 def run_asset(
@@ -74,66 +62,119 @@ def run_asset(
     *,
     format: str | None = None,
     overwrite: bool = False,
+    resume: bool = False,
     strict: bool = False,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
     log: Callable[[str], None] | None = None,
+    patience: Patience | None = None,
 ) -> dict[str, Any]:
     """Age one model and write the folder `out`, whole or not at all; returns the report, with the timing as
-    `timing`.
+    `timing` unless nothing was left to do.
 
-    model: a path, or a binary stream, for which `format` may be given. strict: any warning ends the run with
-    StrictError. threads: how many share a step's work; their number changes no result. progress: called with
-    the steps done and their number. log: called with each warning and with what was done, a line each.
-    Errors: those of reading, of remeshing, and of `output.folder.RunFolder`.
+    model: a path, or a binary stream, for which `format` may be given. resume: go on from what an
+    interrupted run left in `OUT.partial`, or extend the finished run in `out`; begin where there is neither.
+    strict: any warning ends the run with StrictError. threads: how many share a step's work; their number
+    changes no result. progress: called with the steps done and their number. log: called with each warning
+    and with what was done, a line each. patience: entered while steps are made; where it is asked to stop, a
+    checkpoint is written first. Errors: those of reading, of remeshing, of `resume`, and of
+    `output.folder.RunFolder`; one that leaves work to go on from says where in its notes.
     """
     say = log or (lambda line: None)
     watch = Stopwatch()
-    with report_compiling(say), run_folder.RunFolder(out, overwrite=overwrite) as folder:
+    run_folder = RunFolder(out, overwrite=overwrite, resume=resume)
+    with report_compiling(say), note_what_is_kept(run_folder), run_folder as folder:
         with watch.time("read"):
-            surface, inputs = _read(model, format, loaded.config)
-        name = next(iter(inputs))
-        with name_errors(name):
-            report_notes(surface.notes, name, say, strict=strict)
-            painted, untouched = split_paint(surface, loaded.config)
-            plan = make_plan(loaded, painted, len(surface.faces))
-            config = plan.loaded.config
-            if plan.quality is not None:
-                say(f"quality {plan.quality['asked']}: {plan.quality['why']}")
-            with watch.time("remesh"):
-                meshed = remesh_painted(painted, config)
-            report_notes(meshed.notes[len(surface.notes) :], name, say, strict=strict)
-            with watch.time("prepare"):
-                simulation = prepare_simulation(meshed, config, painted, threads=threads)
-        recorder = _SnapshotRecorder(folder, config, untouched, watch)
-        due = config.snapshots.due(config.ageing.steps)
-        run_simulation(simulation, [Recorder(due, recorder.record)], progress)
+            intake = _take_in(loaded, model, format, say, strict=strict)
+        config = intake.plan.loaded.config
+        identity = identify(config, intake.inputs)
+        checkpoint = None
+        if resume:
+            finished = read_finished(run_folder.target, identity)
+            if finished is not None:
+                say(f"{out}: finished already")
+                run_folder.abandon()
+                return finished
+            checkpoint = take_up(run_folder, config, identity)
+        with name_errors(intake.name), watch.time("remesh"):
+            meshed = _mesh(intake, checkpoint, folder)
+        report_notes(meshed.notes[len(intake.surface.notes) :], intake.name, say, strict=strict)
+        with name_errors(intake.name), watch.time("prepare"):
+            simulation = prepare_simulation(meshed, config, intake.painted, threads=threads)
 
-        if untouched is not None:
+        recorder = SnapshotRecorder(folder, config, intake.untouched, watch)
+        keeper = CheckpointKeeper(folder, config, meshed, identity, recorder, watch)
+        if checkpoint:
+            keeper.restore(simulation, checkpoint, recorded_figures(checkpoint, config))
+            say(f"going on from step {simulation.step_count:,} of {simulation.steps:,}")
+        due = config.snapshots.due(config.ageing.steps)
+        recorders = [Recorder(due, recorder.record), Recorder(range(simulation.steps), keeper.consider)]
+        with patience or nullcontext():
+            run_simulation(simulation, recorders, progress, patience=patience, before_stop=keeper.write)
+        keeper.finish(simulation)
+
+        if intake.untouched is not None:
             with watch.time("write"):
-                write_mesh(folder / "untouched.ply", untouched)
+                write_mesh(folder / UNTOUCHED, intake.untouched)
         if config.output.preview:
             with watch.time("pictures"):
-                recorder.write_preview(folder / run_folder.PREVIEW)
+                recorder.write_preview(folder / PREVIEW)
         report = make_report(
             config=config.as_dict(),
             seed=config.seed,
-            inputs=inputs,
-            meshes={"input": measure_surface(surface), "film": measure_surface(simulation.surface)},
+            inputs=intake.inputs,
+            meshes={"input": measure_surface(intake.surface), "film": measure_surface(simulation.surface)},
             notes=meshed.notes,
-            quality=plan.quality,
+            quality=intake.plan.quality,
             stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
             solver=asdict(simulation.solving),
             snapshots=recorder.figures,
         )
-        write_json(folder / run_folder.REPORT, report)
-        around = {
-            key: watch.seconds.get(key, 0.0) for key in ("read", "remesh", "prepare", "write", "pictures")
-        }
-        rows = {**simulation.seconds, "mesh": watch.seconds.get("mesh", 0.0)}
-        timing = make_timing(rows, around)
-        write_json(folder / run_folder.TIMING, timing)
+        write_json(folder / REPORT, report)
+        timing = make_timing(
+            {**simulation.seconds, "mesh": watch.seconds.get("mesh", 0.0)},
+            {key: watch.seconds.get(key, 0.0) for key in _AROUND},
+        )
+        write_json(folder / TIMING, timing)
     return {**report, "timing": timing}
+
+
+def _take_in(
+    loaded: LoadedConfig,
+    model: str | Path | BinaryIO,
+    format: str | None,
+    say: Callable[[str], None],
+    *,
+    strict: bool,
+) -> _Intake:
+    surface, inputs = _read(model, format, loaded.config)
+    name = next(iter(inputs))
+    with name_errors(name):
+        report_notes(surface.notes, name, say, strict=strict)
+        painted, untouched = split_paint(surface, loaded.config)
+        plan = make_plan(loaded, painted, len(surface.faces))
+    if plan.quality is not None:
+        say(f"quality {plan.quality['asked']}: {plan.quality['why']}")
+    return _Intake(surface, painted, untouched, inputs, plan)
+
+
+def _mesh(intake: _Intake, checkpoint: Checkpoint | None, folder: Path) -> Surface:
+    """The surface to simulate: the one that the checkpoint is of, or as the config wants it."""
+    config = intake.plan.loaded.config
+    if checkpoint and config.remesh:
+        return read_kept_surface(folder)
+    return remesh_painted(intake.painted, config)
+
+
+@contextmanager
+def note_what_is_kept(run_folder: RunFolder) -> Iterator[None]:
+    """Note on whatever ends the run early where its work is kept, if there is any to go on from."""
+    try:
+        yield
+    except BaseException as error:
+        if run_folder.is_kept:
+            error.add_note(f"the work so far is kept in {run_folder.path}")
+        raise
 
 
 def _read(model: str | Path | BinaryIO, format: str | None, config: Config) -> tuple[Surface, dict[str, str]]:
@@ -236,9 +277,9 @@ def prepare_simulation(
             deform=fill(DeformParameters, config),
             stain=fill(StainParameters, config),
             palette=Palette(
-                paint=_unit_color(colors.paint),
-                metal=_unit_color(colors.metal),
-                rust=_unit_color(colors.rust),
+                paint=unit_color(colors.paint),
+                metal=unit_color(colors.metal),
+                rust=unit_color(colors.rust),
             ),
             steps=config.ageing.steps,
             duration=config.ageing.duration,
@@ -257,86 +298,3 @@ def fill(kind: type[_Parameters], config: Config) -> _Parameters:
         section, _, key = parameter.name.partition("_")
         values[parameter.name] = getattr(getattr(config, section), key)
     return kind(**values)
-
-
-def picture_parameters(config: Config) -> PictureParameters:
-    """How the pictures of a run are taken."""
-    colors = config.appearance
-    return PictureParameters(
-        width=config.output.picture_width,
-        height=config.output.picture_height,
-        film_thickness=colors.thickness,
-        paint=_unit_color(colors.paint),
-        primer=_unit_color(colors.back),
-        metal=_unit_color(colors.metal),
-        rust_body=_unit_color(colors.rust),
-        dust=_unit_color(colors.dust),
-    )
-
-
-def _unit_color(color: tuple[int, int, int]) -> tuple[float, float, float]:
-    return color[0] / 255, color[1] / 255, color[2] / 255
-
-
-class _SnapshotRecorder:
-    """Writes each snapshot as it is due and keeps its figures and its picture."""
-
-    def __init__(self, folder: Path, config: Config, untouched: Surface | None, watch: Stopwatch) -> None:
-        self.folder = folder / run_folder.SNAPSHOTS
-        self.folder.mkdir()
-        self.config = config
-        self.untouched = untouched
-        self.watch = watch
-        self.figures: list[dict[str, Any]] = []
-        self.images: list[Image] = []
-        self.labels: list[str] = []
-        self.camera: Camera | None = None
-
-    def record(self, simulation: Simulation) -> None:
-        """Write the snapshot of this moment in every wanted format, measure and draw it."""
-        with self.watch.time("mesh"):
-            snapshot = simulation.snapshot()
-        with self.watch.time("write"):
-            self._write(snapshot, simulation)
-            residual = simulation.residual()
-            size = simulation.frame.size
-            self.figures.append(
-                measure_snapshot(
-                    snapshot,
-                    flake_areas=np.asarray(simulation.flake_areas) * size**2,
-                    strain=residual.strain_rms,
-                    residual=residual.angle_rms,
-                    energy=residual.energy,
-                    imbalance=residual.imbalance,
-                )
-            )
-        if self.config.output.preview:
-            with self.watch.time("pictures"):
-                self._draw(snapshot, simulation.surface.up)
-
-    def _write(self, snapshot: Snapshot, simulation: Simulation) -> None:
-        stem = run_folder.snapshot_stem(snapshot.step, simulation.steps)
-        if "ply" in self.config.output.formats:
-            write_snapshot_ply(self.folder, snapshot, stem)
-        if "glb" in self.config.output.formats:
-            write_snapshot_glb(
-                self.folder / f"{stem}.glb",
-                snapshot,
-                thickness=self.config.appearance.thickness * simulation.frame.size,
-                back_color=_unit_color(self.config.appearance.back),
-                up=simulation.surface.up,
-                untouched=self.untouched,
-            )
-
-    def _draw(self, snapshot: Snapshot, up: tuple[float, float, float]) -> None:
-        parameters = picture_parameters(self.config)
-        # of what does not move, and so the same for all snapshots
-        self.camera = self.camera or frame_camera(snapshot, parameters, up=up, untouched=self.untouched)
-        self.images.append(
-            render_snapshot(snapshot, parameters, up=up, untouched=self.untouched, camera=self.camera)
-        )
-        self.labels.append(f"age {snapshot.age:g}")
-
-    def write_preview(self, path: Path) -> None:
-        """Put the pictures of all snapshots on one sheet."""
-        write_png(path, contact_sheet(self.images, self.labels))

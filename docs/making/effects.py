@@ -15,7 +15,7 @@ from weathercoat.config.load import load_config
 from weathercoat.mesh.shapes import make_bracket, make_plate
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.pictures import render_snapshot
-from weathercoat.run import picture_parameters
+from weathercoat.recording import picture_parameters
 
 FOLDER = IMAGES / "parameters"
 FACES, STEPS, SHARE = 3000, 250, 0.6

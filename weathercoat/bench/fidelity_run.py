@@ -17,7 +17,8 @@ from weathercoat.output.display import Normalisation
 from weathercoat.output.pictures import Image, PictureParameters, render_snapshot
 from weathercoat.output.rays import make_rays
 from weathercoat.output.report import measure_snapshot
-from weathercoat.run import picture_parameters, prepare_simulation, remesh_painted
+from weathercoat.recording import picture_parameters
+from weathercoat.run import prepare_simulation, remesh_painted
 from weathercoat.sim.simulation import Simulation
 from weathercoat.sim.snapshot import Snapshot
 

@@ -44,7 +44,7 @@ def run() -> int:
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code; every error is reported on standard error."""
     try:
-        with weathercoat.make_context(PROGRAM, list(arguments)) as context:
+        with weathercoat.make_context(PROGRAM, list(arguments), obj=list(arguments)) as context:
             weathercoat.invoke(context)
         sys.stdout.flush()
         return 0
@@ -55,9 +55,9 @@ def call(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return _BROKEN_PIPE
     except (KeyboardInterrupt, click.Abort):
-        return _stop(Interrupted)
+        return _stop(Interrupted())
     except Stopped as stopped:
-        return _stop(type(stopped))
+        return _stop(stopped)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return error.exit_code
@@ -89,9 +89,10 @@ def _report(raised: Exception, arguments: Sequence[str]) -> int:
         traceback.print_exception(raised)
     error = _as_weathercoat_error(raised)
     if "--json" in options:
-        _say(json.dumps({"error": _as_dict(error)}, ensure_ascii=False))
+        notes = {"notes": _notes(raised)} if _notes(raised) else {}
+        _say(json.dumps({"error": {**_as_dict(error), **notes}}, ensure_ascii=False))
     else:
-        _say("\n".join(f"{PROGRAM}: {line}" for line in error.lines()))
+        _say("\n".join(f"{PROGRAM}: {line}" for line in [*error.lines(), *_notes(raised)]))
     return error.exit_code
 
 
@@ -108,9 +109,14 @@ def _as_dict(error: WeathercoatError) -> dict[str, Any]:
     return content
 
 
-def _stop(kind: type[Stopped]) -> int:
-    _say(f"{PROGRAM}: {kind.word}")
-    return kind.exit_code
+def _stop(stopped: Stopped) -> int:
+    _say("; ".join([f"{PROGRAM}: {stopped.word}", *_notes(stopped)]))
+    return stopped.exit_code
+
+
+def _notes(error: BaseException) -> list[str]:
+    """What was noted on the way out, such as where finished work is kept."""
+    return list(getattr(error, "__notes__", []))
 
 
 def _say(text: str) -> None:

@@ -71,6 +71,11 @@ threads = click.option(
 )
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
+resume = click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on from where an interrupted run stopped, or extend a finished one; begin where there is none.",
+)
 overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")
 strict = click.option("--strict", is_flag=True, help="Refuse a model that needs any repair.")
 log_file = click.option(

@@ -54,7 +54,7 @@ def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
     from weathercoat.mesh.read import read_surface
     from weathercoat.output.folder import REPORT, read_run
     from weathercoat.output.pictures import contact_sheet, frame_camera, render_snapshot
-    from weathercoat.run import picture_parameters
+    from weathercoat.recording import picture_parameters
 
     if not (run / REPORT).exists() and (run.parent / REPORT).exists():
         run = run.parent

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
+from weathercoat.cli.signals import Patience
 from weathercoat.errors import UsageError
 
 _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
@@ -29,6 +32,7 @@ _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
 @options.model_format
 @options.threads
 @options.overwrite
+@options.resume
 @options.strict
 @options.quiet
 @options.as_json
@@ -46,6 +50,7 @@ def command(
     model_format: str | None,
     threads: int | None,
     overwrite: bool,
+    resume: bool,
     strict: bool,
     quiet: bool,
     as_json: bool,
@@ -54,11 +59,14 @@ def command(
     """Age the paint of MODEL by the rules of CONFIG.
 
     CONFIG is a YAML file or the name of a shipped config (see `weathercoat config list`). MODEL is a mesh,
-    or - for standard input. The folder of the results appears only once it is whole.
+    or - for standard input. The folder of the results appears only once it is whole; a run that was
+    interrupted leaves what it has in FOLDER.partial, from where --resume goes on.
     """
     from weathercoat.config.load import load_config
     from weathercoat.output.folder import safe_name
 
+    if overwrite and resume:
+        raise UsageError("--resume goes on, and --overwrite begins anew", remedy="give one of them")
     if output == Path("-"):
         raise UsageError("the results are a folder, not a stream", remedy="name the folder with -o")
     options.require_config_first(config, model)
@@ -68,7 +76,7 @@ def command(
     is_piped = model == "-"
     stem = "model" if is_piped else Path(model).stem
     folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
-    with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
+    with Messages(quiet=quiet or as_json, log_file=log_file) as messages, _say_how_to_go_on():
         from weathercoat.deform.team import usable_cores
         from weathercoat.run import run_asset
 
@@ -78,15 +86,30 @@ def command(
             folder,
             format=model_format,
             overwrite=overwrite,
+            resume=resume,
             strict=strict,
             threads=threads or min(usable_cores(), _MOST_THREADS),
             progress=messages.progress,
             log=messages.log,
+            patience=Patience(),
         )
     if as_json:
         click.echo(json.dumps(report, indent=2, ensure_ascii=False))
     elif not quiet:
         click.echo("\n".join([*_table(report), f"written to {folder}"]))
+
+
+@contextmanager
+def _say_how_to_go_on() -> Iterator[None]:
+    """Note the command that goes on where an error leaves work to go on from."""
+    try:
+        yield
+    except BaseException as error:
+        if getattr(error, "__notes__", None):
+            given = [word for word in click.get_current_context().find_root().obj if word != "--overwrite"]
+            again = given if "--resume" in given else [*given[:1], "--resume", *given[1:]]
+            error.add_note(f"go on with: {shlex.join(['weathercoat', *again])}")
+        raise
 
 
 def _table(report: dict[str, Any]) -> Iterator[str]:

@@ -7,12 +7,13 @@ import signal
 import sys
 import threading
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 SECONDS_UNTIL_AGAIN = 0.02
+SECONDS_OF_PATIENCE = 0.5
 
 
 class Stopped(BaseException):
@@ -46,6 +47,57 @@ def raise_signals() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _raise)
     sys.unraisablehook = _deliver_again
+
+
+class Patience:
+    """While the block runs, a first signal waits for `stop`, but for no longer than `SECONDS_OF_PATIENCE`.
+
+    Only where `raise_signals` has been called, and where the system has a timer; elsewhere signals raise at
+    once, or do what they did before.
+    """
+
+    def __init__(self) -> None:
+        self._asked: int | None = None
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether a signal waits."""
+        return self._asked is not None
+
+    def stop(self) -> NoReturn:
+        """Raise the signal that waits."""
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        assert self._asked is not None
+        raise _RAISED[signal.Signals(self._asked)]
+
+    def __enter__(self) -> Patience:
+        is_main = threading.current_thread() is threading.main_thread()
+        self._patient = [number for number in _RAISED if signal.getsignal(number) is _raise]
+        if not is_main or not hasattr(signal, "setitimer"):
+            self._patient = []
+        if self._patient:
+            self._alarm = signal.signal(signal.SIGALRM, self._expire)
+        for number in self._patient:
+            signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        for number in self._patient:
+            signal.signal(number, _raise)
+        if self._patient:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, self._alarm)
+        if self.is_asked and kind is None:
+            self.stop()
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.is_asked:  # a second one waits no longer
+            self.stop()
+        self._asked = number
+        signal.setitimer(signal.ITIMER_REAL, SECONDS_OF_PATIENCE)
+
+    def _expire(self, number: int, frame: FrameType | None) -> None:
+        self.stop()
 
 
 def _raise(number: int, frame: FrameType | None) -> None:

@@ -425,6 +425,18 @@ class Snapshots(Section):
         return tuple(sorted({-(-steps * (i + 1) // self.count) for i in range(self.count)}))
 
 
+class Checkpoint(Section):
+    """When the state is kept, from which an interrupted run goes on, and a finished one further."""
+
+    minutes: PositiveOrNone = parameter(
+        1.0, "Time between two checkpoints; null: none by time", unit="minutes"
+    )
+    steps: Annotated[int, Field(ge=1), BeforeValidator(_require_number)] | None = parameter(
+        None, "Steps between two checkpoints; null: none by steps"
+    )
+    keep: bool = parameter(True, "Whether the last state stays with the results, for `run --resume`")
+
+
 class Output(Section):
     """What a run writes."""
 
@@ -480,6 +492,7 @@ class Config(Section):
     rust: Rust = Rust()
     appearance: Appearance = Appearance()
     snapshots: Snapshots = Snapshots()
+    checkpoint: Checkpoint = Checkpoint()
     output: Output = Output()
 
     def conflicts(self) -> list[tuple[str, str]]:

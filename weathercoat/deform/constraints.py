@@ -138,6 +138,18 @@ def _follow_events(mesh: HalfEdgeMesh, constraints: Constraints, log: EventLog) 
 
 
 @kernel
+def repack(mesh: HalfEdgeMesh, constraints: Constraints) -> None:
+    """Fill the lanes of all active constraints, and the planes of what moves, from the state; they keep their
+    lanes and seats.
+    """
+    used = mesh.used[0]
+    moving = np.flatnonzero((constraints.inverse_mass[:used] > 0.0) & (mesh.half_edge[:used] >= 0))
+    for v in moving:
+        let_move(mesh, constraints.seats, v)
+    refresh_round(mesh, constraints, moving.astype(np.int32))
+
+
+@kernel
 def wake(mesh: HalfEdgeMesh, constraints: Constraints, vertices: Indices) -> None:
     """Let film vertices move that have separated, sleepers and new copies among them; not yet packed."""
     for v in vertices:

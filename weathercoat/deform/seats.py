@@ -42,7 +42,7 @@ def make_seats(mesh: HalfEdgeMesh) -> Seats:
         first=np.concatenate([[0], np.cumsum(corners)]).astype(np.int32),
         filled=np.zeros(len(corners), np.int32),
         seat=np.full(capacity, -1, np.int32),
-        vertex=np.empty(capacity, np.int32),
+        vertex=np.full(capacity, -1, np.int32),
         plane=np.zeros((capacity, 4)),
         positions=np.zeros((capacity, 3)),  # what empty lanes point to must be readable
     )

@@ -6,6 +6,7 @@ What lies in it:
     timing.json     seconds by stage; the only file that differs from run to run
     preview.png     contact sheet over time
     snapshots/      step_0100.ply and step_0100.glb for each recorded step
+    checkpoint/     what `run --resume` goes on from (see `output.checkpoints`)
     untouched.ply   the parts that carry no paint, where there are any; each GLB holds them as well
 """
 
@@ -25,55 +26,110 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from weathercoat.errors import AccessError, CorruptError, FormatError, OutputError, OutputExistsError
+from weathercoat.errors import (
+    AccessError,
+    CheckError,
+    CorruptError,
+    FormatError,
+    OutputError,
+    OutputExistsError,
+)
+from weathercoat.output.exchange import exchange
+from weathercoat.output.lock import LOCK, FolderLock
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
+UNTOUCHED, CHECKPOINT = "untouched.ply", "checkpoint"
+CHECKPOINT_STATE = f"{CHECKPOINT}/state.npz"  # there is nothing to go on from without it
 LONGEST_NAME = 255
 DEVICE_NAMES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # no files on Windows
 DEVICE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO}
 
 
 class RunFolder:
-    """Context manager that gives a temporary folder, which becomes `target` when the block ends well.
+    """Context manager that gives a working folder, which becomes `target` when the block ends well.
 
-    The temporary folder lies beside the target, hence on its file system, and is removed on any exception. An
-    existing target is refused with OutputExistsError before any work; with `overwrite` it is replaced at the
-    end, and only if it holds the file `marker`, as the folder of a run does, or nothing. OutputError where
-    the target cannot be written, also for a write that fails inside the block because the disk is full. A
-    process that is killed outright leaves `.weathercoat-*.partial` beside the target.
+    The working folder is `TARGET.partial`, beside the target and so on its file system. One process at a time
+    has it; what a process that was killed left there is cleared away. After an exception it is removed,
+    unless it holds a checkpoint to go on from (`is_kept`): such a one is only taken over with `resume`, or
+    begun anew with `overwrite`. A result that failed its checks is no good to go on from.
+
+    An existing target is refused with OutputExistsError before any work; with `overwrite` or `resume` it is
+    replaced at the end, and only if it holds the file `marker`, as the folder of a run does, or nothing.
+    OutputError where the target cannot be written, also for a write that fails inside the block because the
+    disk is full, or where another process is writing it.
     """
 
-    def __init__(self, target: Path | str, *, overwrite: bool = False, marker: str = REPORT) -> None:
+    def __init__(
+        self, target: Path | str, *, overwrite: bool = False, resume: bool = False, marker: str = REPORT
+    ) -> None:
         self.target = _resolved(target)
+        self.path = self.target.with_name(_cut(self.target.name, ".partial", self.target.name))
         self.overwrite = overwrite
+        self.resume = resume
         self.marker = marker
+        self.is_kept = False
+        self._is_wanted = True
         self._check_target()
         self._check_parent()
+        if not (resume or overwrite):
+            self._check_interrupted()
 
     def __enter__(self) -> Path:
-        self.path = _aside(self.target)
-        with _output_errors(self.target):
-            self.path.mkdir()
+        self._lock = FolderLock(self.path)
+        try:
+            with _output_errors(self.target):
+                if self.path.is_dir() and not (self.path / LOCK).exists() and any(self.path.iterdir()):
+                    reason = f"{self.path.name} is in the way"
+                    raise OutputError(reason, file=str(self.target), remedy="move it")
+                self.path.mkdir(exist_ok=True)
+                if not self._lock.take():
+                    raise OutputError("another process is writing it", file=str(self.target))
+            if not self.resume:
+                if not self.overwrite:
+                    self._check_interrupted()
+                self.clear()
+        except BaseException:
+            self._lock.release(remove=not (self.path / CHECKPOINT_STATE).is_file())
+            with contextlib.suppress(OSError):
+                self.path.rmdir()  # only if it is empty
+            raise
         return self.path
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
-            if error is None:
+            if error is None and self._is_wanted:
                 self._put_in_place()
             elif isinstance(error, OSError) and self._is_about_output(error):
                 raise OutputError(_reason(error), file=str(self.target)) from error
         finally:
-            shutil.rmtree(self.path, ignore_errors=True)
+            was_stopped = error is not None and not isinstance(error, CheckError)
+            self.is_kept = was_stopped and (self.path / CHECKPOINT_STATE).is_file()
+            if self.path.is_dir() and not self.is_kept:
+                shutil.rmtree(self.path, ignore_errors=True)
+            self._lock.release(remove=not self.is_kept)
+
+    def abandon(self) -> None:
+        """Let the end of the block leave the target as it is."""
+        self._is_wanted = False
+
+    def clear(self) -> None:
+        """Empty the working folder."""
+        with _output_errors(self.target):
+            for entry in self.path.iterdir():
+                if entry.is_dir() and not entry.is_symlink():
+                    shutil.rmtree(entry)
+                elif entry.name != LOCK:
+                    entry.unlink()
 
     def _check_target(self) -> None:
         if not os.path.lexists(self.target):
             return
         if not self.target.is_dir():
             raise OutputError("is a file, not a folder", file=str(self.target))
-        if not self.overwrite:
+        if not (self.overwrite or self.resume):
             raise OutputExistsError("the folder exists", file=str(self.target))
         with _output_errors(self.target):
             is_run = (self.target / self.marker).is_file() or not any(self.target.iterdir())
@@ -91,6 +147,14 @@ class RunFolder:
         if not os.access(parent, os.W_OK | os.X_OK):
             raise OutputError(f"the folder {parent} is not writable", file=str(self.target))
 
+    def _check_interrupted(self) -> None:
+        if (self.path / CHECKPOINT_STATE).is_file():
+            raise OutputExistsError(
+                f"{self.path.name} holds an interrupted run",
+                file=str(self.target),
+                remedy="go on with --resume, or begin anew with --overwrite",
+            )
+
     def _is_about_output(self, error: OSError) -> bool:
         inside = isinstance(error.filename, str) and Path(error.filename).is_relative_to(self.path)
         return inside or error.errno in DEVICE_ERRORS
@@ -98,17 +162,21 @@ class RunFolder:
     def _put_in_place(self) -> None:
         """Rename the whole folder to the target; what was there goes only once the new one is in place."""
         self._check_target()
-        old = _aside(self.target)
         with _output_errors(self.target):
-            exists = self.target.is_dir()
-            if exists:
-                self.target.rename(old)
-            try:
+            (self.path / LOCK).unlink()
+            if not self.target.is_dir():
                 self.path.rename(self.target)
-            except BaseException:
-                if exists:
+                return
+            old = _aside(self.target)
+            if exchange(self.path, self.target):
+                self.path.rename(old)
+            else:
+                self.target.rename(old)
+                try:
+                    self.path.rename(self.target)
+                except BaseException:
                     old.rename(self.target)
-                raise
+                    raise
         shutil.rmtree(old, ignore_errors=True)
 
 
@@ -151,11 +219,7 @@ def safe_name(text: str, suffix: str = "") -> str:
     name = kept.strip(" .-") or "model"
     if DEVICE_NAMES.fullmatch(name):
         name = f"_{name}"
-    room = LONGEST_NAME - len(suffix.encode())
-    if len(name.encode()) > room:
-        digest = "-" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
-        name = name.encode()[: room - len(digest)].decode("utf-8", "ignore") + digest
-    return name + suffix
+    return _cut(name, suffix, text)
 
 
 def snapshot_stem(step: int, steps: int) -> str:
@@ -205,6 +269,16 @@ def _resolved(target: Path | str) -> Path:
     except (OSError, ValueError) as error:
         raise OutputError(_reason(error), file=str(target)[:100]) from error
     return path
+
+
+def _cut(name: str, suffix: str, text: str) -> str:
+    """A name and a suffix in at most 255 bytes: of a longer name the beginning, and a hash of `text`."""
+    room = LONGEST_NAME - len(suffix.encode())
+    content = name.encode("utf-8", "surrogateescape")
+    if len(content) > room:
+        digest = "-" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
+        name = content[: room - len(digest)].decode("utf-8", "ignore") + digest
+    return name + suffix
 
 
 def _aside(target: Path) -> Path:

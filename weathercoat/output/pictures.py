@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.errors import OutputError
+from weathercoat.errors import CorruptError, OutputError
 from weathercoat.mesh.surface import Surface, Vectors, vertex_normals
 from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
@@ -281,11 +281,24 @@ def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int |
     return np.asarray(sheet)
 
 
-def write_png(target: Path | BinaryIO, image: Image) -> None:
-    """Write an image (h, w, 3) uint8 as PNG; `OutputError` if the target cannot be written."""
+def write_png(target: Path | BinaryIO, image: Image, *, compression: int = 6) -> None:
+    """Write an image (h, w, 3) uint8 as PNG, compressed from 0 to 9; `OutputError` if the target cannot be
+    written.
+    """
     from PIL import Image as Pillow
 
     try:
-        Pillow.fromarray(image).save(target, format="PNG")
+        Pillow.fromarray(image).save(target, format="PNG", compress_level=compression)
     except OSError as error:
         raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
+
+
+def read_png(path: Path) -> Image:
+    """An image (h, w, 3) uint8 that `write_png` wrote; CorruptError if it cannot be read."""
+    from PIL import Image as Pillow
+
+    try:
+        with Pillow.open(path) as image:
+            return np.asarray(image.convert("RGB"))
+    except (OSError, ValueError) as error:
+        raise CorruptError("no picture", file=str(path), remedy="begin anew with --overwrite") from error

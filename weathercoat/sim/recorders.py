@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import Any, NoReturn, Protocol
 
 from weathercoat.sim.simulation import Simulation
 
@@ -16,21 +17,47 @@ class Recorder:
     record: Callable[[Simulation], None]
 
 
+class Patience(Protocol):
+    """Lets a wish to stop wait for the end of a step, while it is entered."""
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether the run is to stop."""
+
+    def stop(self) -> NoReturn:
+        """Raise what ends the run."""
+
+    def __enter__(self) -> object: ...
+
+    def __exit__(self, *error: Any) -> None: ...
+
+
 def run_simulation(
     simulation: Simulation,
     recorders: Sequence[Recorder],
     progress: Callable[[int, int], None] | None = None,
     *,
     until: int | None = None,
+    patience: Patience | None = None,
+    before_stop: Callable[[Simulation], None] | None = None,
 ) -> None:
-    """Step to the end, or to the step `until`; `progress` is called with the steps done and their number."""
+    """Step to the end, or to the step `until`; `progress` is called with the steps done and their number.
+
+    A simulation at its start is recorded before the first step; one that goes on was recorded there already.
+    patience: where it is asked to stop, that is done after the step, and after calling `before_stop`.
+    """
     last = simulation.steps if until is None else min(until, simulation.steps)
-    _record(simulation, recorders)
+    if simulation.step_count == 0:
+        _record(simulation, recorders)
     while simulation.step_count < last:
         simulation.step()
         _record(simulation, recorders)
         if progress is not None:
             progress(simulation.step_count, last)
+        if patience is not None and patience.is_asked:
+            if before_stop is not None:
+                before_stop(simulation)
+            patience.stop()
 
 
 def _record(simulation: Simulation, recorders: Sequence[Recorder]) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 import numpy as np
 
-from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release
+from weathercoat.deform.constraints import Constraints, follow_events, make_constraints, release, repack
 from weathercoat.deform.deformation import deform
 from weathercoat.deform.descending import Solved
 from weathercoat.deform.momentum import Momentum, make_momentum
@@ -100,6 +101,11 @@ class Simulation:
         self.rest = make_rest(len(self.mesh.twin))
         has_momentum = self.deform_parameters.deformation_solver == "momentum"
         self.momentum = make_momentum(self.mesh, self.constraints) if has_momentum else None
+        self.derive()
+
+    def derive(self) -> None:
+        """Make anew what follows from the state; to be called after the state was changed from outside."""
+        repack(self.mesh, self.constraints)
         self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
         self.agenda = make_agenda(self.mesh, self.film, make_film_rules(self.film_parameters))
 
@@ -109,13 +115,13 @@ class Simulation:
         return self.age_after(self.step_count)
 
     def age_after(self, steps: int) -> float:
-        """The age after a number of steps."""
-        return self.duration * steps / self.steps
+        """The age after a number of steps; that after the same step of a longer run has the same bits."""
+        return float(Fraction(str(self.duration)) * steps / self.steps)
 
     def step(self, count: int = 1) -> None:
         """Age by `count` steps at once: age, separate, fracture, flake, deform, stain."""
         self.step_count += count
-        age, tick = self.age, count * self.duration / self.steps
+        age, tick = self.age, self.age_after(count)
         started = time.perf_counter()
         self.log.clear()
 

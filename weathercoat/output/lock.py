@@ -1,0 +1,62 @@
+"""A lock on a folder that holds as long as its process lives, however that ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+LOCK = "lock"
+
+
+class FolderLock:
+    """The lock of a folder: `take` it, and nobody else can until `release` or the end of the process.
+
+    It is a lock of the operating system on the file `lock` in the folder, so none is left behind by a process
+    that was killed.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / LOCK
+        self._stream: BinaryIO | None = None
+
+    def take(self) -> bool:
+        """Take the lock; False where another process has it. Raises OSError where there can be none."""
+        stream = self._path.open("ab")
+        try:
+            _lock(stream)
+            # who had it may have moved the folder away between the opening and the locking
+            is_here = os.path.samestat(os.fstat(stream.fileno()), self._path.stat())
+        except OSError:
+            is_here = False
+        if not is_here:
+            stream.close()
+            return False
+        self._stream = stream
+        return True
+
+    def release(self, *, remove: bool) -> None:
+        """Give the lock back, if it was taken; its file goes, or stays and tells whose folder this is."""
+        if self._stream is None:
+            return
+        if os.name == "nt":  # where a file that is open cannot go
+            self._stream.close()
+        if remove:
+            with contextlib.suppress(OSError):
+                self._path.unlink()
+        self._stream.close()
+        self._stream = None
+
+
+if os.name == "nt":
+    import msvcrt
+
+    def _lock(stream: BinaryIO) -> None:
+        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+
+else:
+    import fcntl
+
+    def _lock(stream: BinaryIO) -> None:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
