@@ -151,9 +151,9 @@ class CheckpointKeeper:
     def consider(self, simulation: Simulation) -> None:
         """Write a checkpoint if one is due after this step."""
         wanted, step = self.config.checkpoint, simulation.step_count
-        is_due = wanted.steps is not None and step > 0 and step % wanted.steps == 0
+        is_due = wanted.steps > 0 and step > 0 and step % wanted.steps == 0
         # a clock may be set, but the monotonic one does not go back
-        if wanted.minutes is not None and time.monotonic() - self._since >= 60.0 * wanted.minutes:
+        if wanted.minutes > 0.0 and time.monotonic() - self._since >= 60.0 * wanted.minutes:
             is_due = True
         if is_due:
             self.write(simulation)

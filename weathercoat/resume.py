@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,9 @@ def read_finished(folder: Path, identity: Mapping[str, Any]) -> dict[str, Any] |
     return report
 
 
-def take_up(folder: RunFolder, config: Config, identity: Mapping[str, Any]) -> Checkpoint | None:
+def take_up(
+    folder: RunFolder, config: Config, identity: Mapping[str, Any], say: Callable[[str], None]
+) -> Checkpoint | None:
     """The checkpoint from which the run of a config and its identity goes on; the working folder then holds
     what has been recorded until there.
 
@@ -58,7 +60,12 @@ def take_up(folder: RunFolder, config: Config, identity: Mapping[str, Any]) -> C
             continue
         found = checkpoint.about if checkpoint else _identity_of(report or {})
         _check_same(found, identity, str(place))
-        if checkpoint is None or not _has_all_snapshots(checkpoint, config):
+        if checkpoint is None:
+            say(f"{place}: keeps no checkpoint, so the run begins again")
+            break
+        passed = _passed_snapshots(checkpoint, config)
+        if passed:
+            say(f"{place}: has no snapshot of step {passed[0]}, so the run begins again")
             break
         if checkpoint.step > config.ageing.steps:
             what = f"the run has reached step {checkpoint.step}, and ageing.steps is {config.ageing.steps}"
@@ -66,7 +73,8 @@ def take_up(folder: RunFolder, config: Config, identity: Mapping[str, Any]) -> C
         if place == folder.target:
             folder.clear()
             for name in (SNAPSHOTS, CHECKPOINT):
-                shutil.copytree(place / name, folder.path / name)
+                if (place / name).is_dir():
+                    shutil.copytree(place / name, folder.path / name)
         _keep_recorded(folder.path, checkpoint, config)
         return checkpoint
     folder.clear()
@@ -143,10 +151,11 @@ def _flat(config: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield prefix + key, value
 
 
-def _has_all_snapshots(checkpoint: Checkpoint, config: Config) -> bool:
+def _passed_snapshots(checkpoint: Checkpoint, config: Config) -> list[int]:
+    """The steps whose snapshots are wanted, and that were passed without one."""
     recorded = {figures["step"] for figures in recorded_figures(checkpoint, config)}
     due = config.snapshots.due(config.ageing.steps)
-    return all(step in recorded for step in due if step <= checkpoint.step)
+    return [step for step in due if step <= checkpoint.step and step not in recorded]
 
 
 def _keep_recorded(folder: Path, checkpoint: Checkpoint, config: Config) -> None:
@@ -158,7 +167,7 @@ def _keep_recorded(folder: Path, checkpoint: Checkpoint, config: Config) -> None
         for figures in recorded_figures(checkpoint, config)
     }
     arrays = {folder / CHECKPOINT_STATE, folder / SURFACE}
-    for path in [*(folder / SNAPSHOTS).iterdir(), *(folder / CHECKPOINT).iterdir()]:
+    for path in [*(folder / SNAPSHOTS).glob("*"), *(folder / CHECKPOINT).iterdir()]:
         if path.stem in stems:
             path.rename(path.with_name(stems[path.stem] + path.suffix))
         elif path not in arrays:

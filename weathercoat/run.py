@@ -95,7 +95,7 @@ def run_asset(
                 say(f"{out}: finished already")
                 run_folder.abandon()
                 return finished
-            checkpoint = take_up(run_folder, config, identity)
+            checkpoint = take_up(run_folder, config, identity, say)
         with name_errors(intake.name), watch.time("remesh"):
             meshed = _mesh(intake, checkpoint, folder)
         report_notes(meshed.notes[len(intake.surface.notes) :], intake.name, say, strict=strict)

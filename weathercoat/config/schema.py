@@ -428,12 +428,10 @@ class Snapshots(Section):
 class Checkpoint(Section):
     """When the state is kept, from which an interrupted run goes on, and a finished one further."""
 
-    minutes: PositiveOrNone = parameter(
-        1.0, "Time between two checkpoints; null: none by time", unit="minutes"
+    minutes: Real = parameter(
+        1.0, "Time between two checkpoints; 0: none by time", unit="minutes", ge=0, le=1e6
     )
-    steps: Annotated[int, Field(ge=1), BeforeValidator(_require_number)] | None = parameter(
-        None, "Steps between two checkpoints; null: none by steps"
-    )
+    steps: Whole = parameter(0, "Steps between two checkpoints; 0: none by steps", ge=0, le=10_000_000)
     keep: bool = parameter(True, "Whether the last state stays with the results, for `run --resume`")
 
 
