@@ -30,11 +30,16 @@ class WeathercoatError(Exception):
     def line(self) -> str:
         """The whole message on one line, without the program's name."""
         where = f"{self.file}: " if self.file else ""
-        return " ".join(f"{where}{self.code}: {self.message}; {self.remedy}".split())
+        return _one_line(f"{where}{self.code}: {self.message}; {self.remedy}")
 
     def lines(self) -> list[str]:
         """The message as it is printed: one line for each problem."""
         return [self.line()]
+
+
+def _one_line(text: str) -> str:
+    """`text` on one line; what no terminal should get, such as an escape in a file name, is spelt out."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class UsageError(WeathercoatError):
@@ -93,7 +98,7 @@ class ConfigError(WeathercoatError):
         if not self.problems:
             return super().lines()
         keyed = ((p.place(), f"{p.key}: {p.what}" if p.key else p.what) for p in self.problems)
-        return [" ".join(f"{place}: {self.code}: {what}".split()) for place, what in keyed]
+        return [_one_line(f"{place}: {self.code}: {what}") for place, what in keyed]
 
 
 class ModelError(WeathercoatError):

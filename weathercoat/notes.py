@@ -22,7 +22,8 @@ _TEXTS: dict[str, tuple[str, str]] = {
         "Ask for more faces, or raise `remesh.crease_angle`.",
     ),
     "W-BADINDEX": (
-        "Faces with an index that the format does not allow (0 in OBJ, negative in PLY) were dropped.",
+        "Faces with an index that the format does not allow (0 in OBJ, negative in PLY) were dropped; or "
+        "corners name a texture coordinate or a normal that does not exist.",
         "Export again if parts are missing.",
     ),
     "W-BOUNDARY": (
@@ -56,7 +57,8 @@ _TEXTS: dict[str, tuple[str, str]] = {
     ),
     "W-MORPH": ("The file has morph targets, which are not kept.", "Export the wanted shape."),
     "W-NONFINITE": (
-        "Vertices with infinite or undefined positions were dropped with their faces.",
+        "Vertices with infinite or undefined positions were dropped with their faces; texture coordinates "
+        "and colours like that were set to zero.",
         "Export again.",
     ),
     "W-NONMANIFOLD": ("Edges of more than two faces were split, so that the film is a sheet.", "Nothing."),
@@ -74,6 +76,10 @@ _TEXTS: dict[str, tuple[str, str]] = {
     "W-SOUP": (
         "Most faces share no edge with another, so that the film cannot hang together.",
         "Merge vertices in a modelling program.",
+    ),
+    "W-UNKNOWN": (
+        "A glTF has properties of its meshes or nodes that glTF does not know and that were passed over.",
+        "Look whether a name is misspelt.",
     ),
     "W-UNREFERENCED": ("Vertices that no face uses were dropped.", "Nothing."),
     "W-WELDED": ("Vertices at the same position were merged.", "Nothing."),

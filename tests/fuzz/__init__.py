@@ -1,1 +1,1 @@
-"""Fuzzing: inputs made from good ones by random changes, each with a verdict; `python -m tests.fuzz --help`."""
+"""Fuzzing: good inputs, damaged at random, each with a verdict; see `python -m tests.fuzz --help`."""

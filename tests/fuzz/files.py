@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,18 +21,28 @@ from tests.fuzz import strict
 from tests.fuzz.mutations import mutate
 from tests.fuzz.seeds import Seed, make_seeds, real_seeds
 from tests.fuzz.workers import Verdict, Worker
-from weathercoat.errors import CorruptError, FormatError, WeathercoatError
+from weathercoat.errors import WeathercoatError
 from weathercoat.mesh import topology
 from weathercoat.mesh.read import read_surface
 from weathercoat.mesh.surface import Surface
 
 _EXIT_CODES = (3, 4, 5)
+_REAL_SHARE = 0.25  # of the cases, where there are real files
 Case = tuple[str, bytes]  # extension, content
 
 
-def make_case(seeds: list[Seed], seed: int, number: int) -> Case:
-    """The damaged file of this number; the same for the same seeds and `seed`."""
+@dataclass(frozen=True)
+class Sources:
+    """The seeds: those of every checkout, and real files where there are any."""
+
+    own: list[Seed]
+    real: list[Seed]
+
+
+def make_case(sources: Sources, seed: int, number: int) -> Case:
+    """The damaged file of this number; the same for the same sources and `seed`."""
     random = np.random.default_rng([seed, number])
+    seeds = sources.real if sources.real and random.random() < _REAL_SHARE else sources.own
     source = seeds[int(random.integers(len(seeds)))]
     return source.extension, mutate(source, random)
 
@@ -100,31 +111,19 @@ def _contradiction(surface: Surface, data: bytes) -> str | None:
     return None
 
 
-def _is_too_strict(case: Case, verdict: Verdict) -> bool:
-    """Whether a file was called corrupt that the strict parser finds well-formed; no violation, but worth a
-    look."""
-    if verdict.what not in (CorruptError.code, FormatError.code):
-        return False
-    try:
-        content = strict.parse(case[1], case[0])
-    except strict.BrokenError:
-        return False
-    return content is not None and content.triangles > 0
-
-
 def run(
-    count: int | None, seed: int, *, seconds: float | None = None, seeds: list[Seed] | None = None
+    sources: Sources, count: int | None, seed: int, *, seconds: float | None = None
 ) -> tuple[Counter[str], list[tuple[int, Case, Verdict]]]:
     """Judge `count` cases, or as many as `seconds` allow: how often each outcome, and the violations."""
-    seeds = make_seeds() if seeds is None else seeds
     outcomes: Counter[str] = Counter()
     violations = []
     end = None if seconds is None else time.monotonic() + seconds
-    with Worker(judge, (seeds[0].extension, seeds[0].data)) as worker:
+    first = sources.own[0]
+    with Worker(judge, (first.extension, first.data)) as worker:
         for number in _numbers(count):
             if end is not None and time.monotonic() > end:
                 break
-            case = make_case(seeds, seed, number)
+            case = make_case(sources, seed, number)
             verdict = worker.judge(case)
             outcomes[f"{verdict.kind} {verdict.what}" if verdict.kind != "violation" else "violation"] += 1
             if verdict.kind == "violation":
@@ -152,19 +151,20 @@ def main(arguments: list[str]) -> int:
     if options.replay is not None:
         print(judge((options.replay.suffix[1:], options.replay.read_bytes())))
         return 0
-    seeds = make_seeds() + real_seeds()
+    sources = Sources(make_seeds(), real_seeds())
     if options.only is not None:
-        case = make_case(seeds, options.seed, options.only)
+        case = make_case(sources, options.seed, options.only)
         path = _write(options.output, options.seed, options.only, case)
         print(f"{path}: {judge(case)}")
         return 0
     if options.count is None and options.seconds is None:
         parser.error("give --count or --seconds")
     start = time.monotonic()
-    outcomes, violations = run(options.count, options.seed, seconds=options.seconds, seeds=seeds)
+    outcomes, violations = run(sources, options.count, options.seed, seconds=options.seconds)
     for number, case, verdict in violations:
         print(f"{_write(options.output, options.seed, number, case)}: {verdict.what}")
-    print(f"{outcomes.total()} files from {len(seeds)} seeds in {time.monotonic() - start:.0f} s")
+    seeds = f"{len(sources.own)} + {len(sources.real)} seeds"
+    print(f"{outcomes.total()} files from {seeds} in {time.monotonic() - start:.0f} s")
     for outcome, times in sorted(outcomes.items()):
         print(f"{times:8d} {outcome}")
     return len(violations)

@@ -1,4 +1,4 @@
-"""The good files that the fuzzer damages: own shapes in every format written, texts by hand, real small ones."""
+"""The good files that the fuzzer damages: own shapes in every format, texts by hand, real small ones."""
 
 from __future__ import annotations
 

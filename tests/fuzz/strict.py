@@ -4,7 +4,8 @@ Plain Python without any code of the package, slow, and made only to contradict 
 pass beyond the letter, because programs write it and it can mean one thing only: byte order marks, UTF-16
 with one, CR and CRLF, blanks and empty lines anywhere in text, comments behind a blank in OBJ and OFF,
 `1/` and `1//` in OBJ, whole numbers written as 3.0 in text PLY, a last line end after a binary PLY, upper
-case in STL, OBJ statements of free-form geometry, in glTF everything that does not make the surface.
+case in STL, in OBJ statements of free-form geometry and indices of normals where all normals were stripped,
+in glTF everything that does not make the surface.
 """
 
 from __future__ import annotations
@@ -164,13 +165,18 @@ def _obj(data: bytes) -> Content:
     points: list[Point] = [(p[0], p[1], p[2]) for p in values[b"v"]]
     flaws: list[Flaw] = []
     _check_finite(points, flaws)
-    for element in [*faces, *others]:
+    for number, element in enumerate([*faces, *others]):
         for v, vt, vn in element:
             for index, kind in ((v, b"v"), (vt, b"vt")):
                 if index is not None and index >= len(values[kind]):
                     raise BrokenError(f"index {index} of {len(values[kind])} {kind!r}")
-            if any(index is not None and index < 0 for index in (v, vt, vn)) or (
-                vn is not None and vn >= len(values[b"vn"])
+            if number >= len(faces):
+                if v is not None and v < 0:
+                    raise BrokenError("a point or a line with index 0")
+                continue
+            normals = range(len(values[b"vn"]))
+            if any(index is not None and index < 0 for index in (v, vt)) or (
+                vn is not None and normals and vn not in normals
             ):
                 flaws.append(Flaw("an illegal index", ("W-BADINDEX",)))
     if any(len(face) < 3 for face in faces):
@@ -195,9 +201,9 @@ def _obj_corners(words: list[bytes], before: list[int]) -> list[tuple[int | None
         corner: list[int | None] = []
         for text, count in zip((v, vt, vn), before, strict=True):
             index = None if text is None else int(text)
-            if index is not None and index < -count:
+            if index is not None and index < -count and text is not vn:
                 raise BrokenError(f"{index} lies before the first")
-            corner.append(index if index is None else index - 1 if index >= 0 else count + index)
+            corner.append(index if index is None else index - 1 if index >= 0 else max(count + index, -1))
             if text is not None and re.fullmatch(rb"-0+", text):
                 corner[-1] = -1
         corners.append(tuple(corner))
@@ -276,7 +282,7 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if not re.match(rb"ply\r?\n|ply\r", data):
         raise BrokenError("no ply at the beginning")
     end = b"\r" if re.match(rb"ply\r(?!\n)", data) else b"\n"
-    format, elements = "", list[_Element]()
+    magic, format, elements = False, "", list[_Element]()
     while True:
         line, found, data = data.partition(end)
         if not found:
@@ -285,8 +291,10 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], bytes]:
         match words:
             case ["end_header"]:
                 break
-            case [] | ["ply"] | ["comment" | "obj_info", *_]:
+            case [] | ["comment" | "obj_info", *_]:
                 continue
+            case ["ply"] if not magic:
+                magic = True
             case ["format", name, "1.0"] if not format and not elements:
                 format = name
             case ["element", name, count] if all(name != e[0] for e in elements):
@@ -299,6 +307,8 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], bytes]:
                 _add_property(elements[-1][2], (name, _ply_type(type), ""))
             case _:
                 raise BrokenError(f"{line!r} in the header")
+    if any(count and not properties for _, count, properties in elements):
+        raise BrokenError("an element without properties")
     if format not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise BrokenError(f"format {format!r}")
     return format, elements, data

@@ -15,6 +15,7 @@ import numpy as np
 from weathercoat.errors import (
     AccessError,
     EmptyFileError,
+    FormatError,
     LimitError,
     Note,
     UsageError,
@@ -102,26 +103,31 @@ def _make_surface(
     up: tuple[float, float, float] | None,
     max_faces: int,
 ) -> Surface:
-    if not data:
-        raise EmptyFileError("the file has no bytes")
-    extension = Path(name).suffix.lower().removeprefix(".")
-    notes: list[Note] = []
-    if format is not None:
-        kind = format.lower().removeprefix(".")
-    else:
-        kind, note = sniff.identify(data, extension)
-        notes += [note] if note else []
+    kind, notes = _kind(data, name, format)
     if kind == "zip":
         from weathercoat.mesh.formats.archive import unpack_model
 
         data, name = unpack_model(data, MAX_BYTES)
-        return _make_surface(data, None, name, None, up, max_faces)
+        path = None
+        kind, notes = _kind(data, name, None)
+        if kind == "zip":
+            raise FormatError("a zip archive within a zip archive", remedy="unpack it first")
     axis = up or _AXES[UP_OF_FORMAT.get(kind, _UP_OF_OTHERS)]
     # Numbers that are not finite, or too large, are found and reported by the checks, not by NumPy.
     with np.errstate(invalid="ignore", over="ignore"):
         polygons = _parse(data, kind, path)
         polygons.notes[:0] = notes
         return repair(polygons, up=axis, name=Path(name).stem, format=kind, max_faces=max_faces)
+
+
+def _kind(data: bytes, name: str, format: str | None) -> tuple[str, list[Note]]:
+    """The format that is given, else that of the content and the name; a note where these disagree."""
+    if not data:
+        raise EmptyFileError("the file has no bytes")
+    if format is not None:
+        return format.lower().removeprefix("."), []
+    kind, note = sniff.identify(data, Path(name).suffix.lower().removeprefix("."))
+    return kind, [note] if note else []
 
 
 def _parse(data: bytes, kind: str, path: Path | None) -> Polygons:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ from weathercoat.mesh.formats.polygons import Polygons
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_QUANTIZED = "KHR_mesh_quantization"
 # Required extensions that leave the geometry as it is, or that are followed here.
 _HARMLESS = (
     "KHR_materials_",
@@ -42,11 +44,28 @@ _HARMLESS = (
     "EXT_texture_",
     "KHR_lights_",
     "KHR_xmp",
-    "KHR_mesh_quantization",
+    _QUANTIZED,
 )
 # Extensions that put the geometry of a primitive elsewhere.
 _ELSEWHERE = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _MAX_CORNERS = 300_000_000
+_MAX_ROTATION_ERROR = 0.02
+_SEMANTIC = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR|JOINTS|WEIGHTS)_[0-9]+|_.*", re.DOTALL)
+# Component types and whether they are normalised, without quantisation.
+_FLOATS = frozenset({(5126, False)})
+_NORMALISED = frozenset({(5126, False), (5121, True), (5123, True)})
+_UNSIGNED = frozenset({(5121, False), (5123, False), (5125, False)})
+_KEYS = {
+    kind: frozenset({*keys.split(), "name", "extensions", "extras"})
+    for kind, keys in {
+        "node": "camera children skin matrix mesh rotation scale translation weights",
+        "mesh": "primitives weights",
+        "primitive": "attributes indices material mode targets",
+        "accessor": "bufferView byteOffset componentType normalized count type max min sparse",
+        "bufferView": "buffer byteOffset byteLength byteStride target",
+        "buffer": "uri byteLength",
+    }.items()
+}
 
 
 @dataclass
@@ -78,18 +97,22 @@ class _Document:
         self.folder = folder
         text, self.chunk = _chunks(data) if data.startswith(b"glTF") else (data, None)
         try:
-            self.json: dict[str, Any] = json.loads(text.decode("utf-8-sig"))
+            self.json: dict[str, Any] = json.loads(
+                text.decode("utf-8-sig"), object_pairs_hook=_without_repeats
+            )
         except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
             raise CorruptError(f"the JSON is broken: {error}") from None
         if not isinstance(self.json, dict):
             raise CorruptError("the JSON is no object")
-        version = str(self.json.get("asset", {}).get("version", ""))
-        if not version.startswith("2."):
-            raise UnsupportedError(f"glTF version {version or 'unknown'} is not supported, only 2")
-        for name in self.json.get("extensionsRequired", []):
+        version = self.json["asset"]["version"]
+        if not isinstance(version, str) or not re.fullmatch(r"2\.[0-9]+", version):
+            raise UnsupportedError(f"glTF version {str(version)[:20]!r} is not supported, only 2")
+        self.required = self.json.get("extensionsRequired", [])
+        for name in self.required:
             if not str(name).startswith(_HARMLESS):
-                raise UnsupportedError(f"the extension {name} is required")
+                raise UnsupportedError(f"the extension {str(name)[:60]!r} is required")
         self.buffers: dict[int, bytes] = {}
+        self.unknown: dict[str, None] = {}
 
     def polygons(self) -> Polygons:
         parts = _Parts()
@@ -104,7 +127,7 @@ class _Document:
         face_group, groups = number_groups(part, parts.names)
         corners = triangles.ravel()
         uv = _joined(parts.uv, sizes, np.zeros(2))
-        return Polygons(
+        result = Polygons(
             positions=np.concatenate(parts.positions),
             corners=corners,
             sizes=np.full(len(triangles), 3, np.int64),
@@ -117,6 +140,8 @@ class _Document:
             shared=False,
             notes=self._lost(),
         )
+        result.tidy_attributes()
+        return result
 
     def _lost(self) -> list[Note]:
         """Notes on what cannot be kept."""
@@ -126,6 +151,11 @@ class _Document:
             ("W-ANIMATION", len(self.json.get("animations", [])), "animations cannot be kept"),
             ("W-MORPH", targets, "primitives have morph targets, which cannot be kept"),
             ("W-MATERIAL", self._missing_images(), "pictures are not beside the model"),
+            (
+                "W-UNKNOWN",
+                len(self.unknown),
+                f"properties that glTF does not know: {', '.join(self.unknown)[:200]}",
+            ),
         )
         return [Note(code, count, text) for code, count, text in lost if count]
 
@@ -153,6 +183,7 @@ class _Document:
             if seen[i]:
                 raise CorruptError(f"node {i} is reached twice: the nodes are no tree")
             seen[i] = True
+            self._note_unknown(nodes[i], "node")
             with np.errstate(invalid="ignore", over="ignore"):
                 matrix = np.einsum("ij,jk->ik", outer, _matrix(nodes[i]))
             if "mesh" in nodes[i]:
@@ -174,20 +205,32 @@ class _Document:
     ) -> None:
         _check_index(node["mesh"], self.json.get("meshes", []), "mesh")
         mesh = self.json["meshes"][node["mesh"]]
+        self._note_unknown(mesh, "mesh")
+        if not isinstance(mesh["primitives"], list):
+            raise CorruptError("primitives are no list")
         for primitive in mesh["primitives"]:
-            mode = primitive.get("mode", _TRIANGLES)
+            self._note_unknown(primitive, "primitive")
+            mode = _natural(primitive.get("mode", _TRIANGLES), "mode")
             attributes = primitive["attributes"]
-            if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in attributes:
+            for name in attributes:
+                if not _SEMANTIC.fullmatch(name):
+                    raise CorruptError(
+                        f"mesh {mesh.get('name', node['mesh'])!r} has an attribute {name[:40]!r}"
+                    )
+            if mode > _FAN or not attributes:
+                raise CorruptError(f"a primitive has mode {mode} and {len(attributes)} attributes")
+            if mode < _TRIANGLES:
                 continue
             for extension in _ELSEWHERE:
                 if extension in primitive.get("extensions", {}) and "bufferView" not in self._accessor_entry(
                     attributes["POSITION"]
                 ):
                     raise UnsupportedError(f"a mesh is stored by the extension {extension}")
-            local = self._accessor(attributes["POSITION"], "VEC3")
+            local = self._accessor(attributes["POSITION"], ("VEC3",), _FLOATS)
             indices = np.arange(len(local))
             if "indices" in primitive:
-                indices = self._accessor(primitive["indices"], "SCALAR").ravel().astype(np.int64)
+                listed = self._accessor(primitive["indices"], ("SCALAR",), _UNSIGNED)
+                indices = listed.ravel().astype(np.int64)
             triangles = _triangles(indices, mode, len(local), mesh.get("name", node["mesh"]))
             parts.corners += 3 * len(triangles)
             if parts.corners > _MAX_CORNERS:
@@ -222,23 +265,39 @@ class _Document:
     ) -> NDArray[np.float64] | None:
         if name not in attributes:
             return None
-        values = self._accessor(attributes[name], *types)
+        values = self._accessor(attributes[name], types, _NORMALISED)
         if len(values) != count:
             raise CorruptError(f"{name} has {len(values)} values for {count} vertices")
-        return np.nan_to_num(values, posinf=0.0, neginf=0.0)
+        return values
+
+    def _note_unknown(self, entry: dict[str, Any], kind: str) -> None:
+        """Keep in mind the keys that no `kind` has: one of them may be a misspelt part of the surface."""
+        for key in entry.keys() - _KEYS[kind]:
+            self.unknown.setdefault(f"{key[:40]!r} of a {kind}")
 
     def _accessor_entry(self, index: int) -> dict[str, Any]:
         _check_index(index, self.json.get("accessors", []), "accessor")
         entry: dict[str, Any] = self.json["accessors"][index]
         return entry
 
-    def _accessor(self, index: int, *types: str) -> NDArray[np.float64]:
-        """The values of an accessor, (count, width)."""
+    def _accessor(
+        self, index: int, types: tuple[str, ...], components: frozenset[Any]
+    ) -> NDArray[np.float64]:
+        """The values of an accessor, (count, width).
+
+        components: what the component type and whether it is normalised may be; with quantisation, anything.
+        """
         entry = self._accessor_entry(index)
+        self._note_unknown(entry, "accessor")
         if entry["type"] not in types:
             raise CorruptError(f"accessor {index} is of type {entry['type']}, expected {' or '.join(types)}")
+        component = (entry["componentType"], entry.get("normalized", False))
+        if component not in components and (
+            components is _UNSIGNED or component[1] not in (True, False) or _QUANTIZED not in self.required
+        ):
+            raise CorruptError(f"accessor {index} cannot have the component type {component[0]} here")
         width, kind = _WIDTHS[entry["type"]], np.dtype(_COMPONENTS[entry["componentType"]])
-        count = _natural(entry["count"], "count")
+        count = _positive(entry["count"], "count")
         if "bufferView" in entry:
             values = self._view(entry["bufferView"], entry.get("byteOffset", 0), count, width, kind, index)
         else:
@@ -252,15 +311,17 @@ class _Document:
         return np.maximum(values.astype(np.float64) / np.iinfo(kind).max, -1.0)
 
     def _filled(self, values: NDArray[Any], sparse: dict[str, Any], index: int) -> NDArray[Any]:
-        count = _natural(sparse["count"], "count")
+        count = _positive(sparse["count"], "count")
         where, what = sparse["indices"], sparse["values"]
         kind = np.dtype(_COMPONENTS[where["componentType"]])
         rows = self._view(where["bufferView"], where.get("byteOffset", 0), count, 1, kind, index).ravel()
         new = self._view(
             what["bufferView"], what.get("byteOffset", 0), count, values.shape[1], values.dtype, index
         )
-        if kind.kind != "u" or (rows >= len(values)).any():
-            raise CorruptError(f"accessor {index} has a sparse index beyond its {len(values)} values")
+        if kind.kind != "u" or (np.diff(rows.astype(np.int64)) <= 0).any() or rows[-1] >= len(values):
+            raise CorruptError(
+                f"accessor {index} has sparse indices that do not rise, or beyond {len(values)}"
+            )
         values = values.copy()
         values[rows] = new
         return values
@@ -272,23 +333,27 @@ class _Document:
         views = self.json.get("bufferViews", [])
         _check_index(view_index, views, "bufferView")
         view = views[view_index]
+        self._note_unknown(view, "bufferView")
         row = width * kind.itemsize
-        stride = _natural(view.get("byteStride", row), "byteStride") or row
+        stride = _natural(view.get("byteStride", row), "byteStride")
         begin = _natural(view.get("byteOffset", 0), "byteOffset")
-        length = _natural(view["byteLength"], "byteLength")
+        length = _positive(view["byteLength"], "byteLength")
         buffer = self._buffer(view["buffer"])
         if begin + length > len(buffer):
             raise CorruptError(
                 f"bufferView {view_index} ends at byte {begin + length}, its buffer at {len(buffer)}"
             )
         offset = _natural(offset, "byteOffset")
-        needed = offset + (stride * (count - 1) + row if count else 0)
+        needed = offset + stride * (count - 1) + row
+        if "byteStride" in view and (stride % 4 or not 4 <= stride <= 252):
+            raise CorruptError(f"bufferView {view_index} has a byteStride of {stride}")
         if stride < row or needed > length:
             raise CorruptError(f"accessor {accessor} needs {needed} bytes, its bufferView has {length}")
-        if not count:
-            return np.zeros((0, width), kind)
-        strides = (stride, kind.itemsize)
-        return np.ndarray((count, width), kind, buffer, begin + offset, strides)
+        if (begin + offset) % kind.itemsize:
+            raise CorruptError(
+                f"accessor {accessor} begins at byte {begin + offset}, no multiple of {kind.itemsize}"
+            )
+        return np.ndarray((count, width), kind, buffer, begin + offset, (stride, kind.itemsize))
 
     def _buffer(self, index: int) -> bytes:
         entries = self.json.get("buffers", [])
@@ -298,6 +363,8 @@ class _Document:
         return self.buffers[index]
 
     def _load_buffer(self, index: int, entry: dict[str, Any]) -> bytes:
+        self._note_unknown(entry, "buffer")
+        announced = _positive(entry["byteLength"], "byteLength")
         uri = entry.get("uri")
         if uri is None:
             if index != 0 or self.chunk is None:
@@ -312,8 +379,7 @@ class _Document:
             except binascii.Error as error:
                 raise CorruptError(f"buffer {index}: {error}") from None
         else:
-            data = self._load_beside(uri, _natural(entry["byteLength"], "byteLength"))
-        announced = _natural(entry["byteLength"], "byteLength")
+            data = self._load_beside(uri, announced)
         if len(data) < announced:
             raise CorruptError(f"buffer {index} is announced with {announced} bytes, but holds {len(data)}")
         return data[:announced]
@@ -355,31 +421,56 @@ def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
     chunks = []
     while at < len(data):
         size = int.from_bytes(data[at : at + 4], "little")
+        if size % 4:
+            raise CorruptError(f"a chunk has {size} bytes, which is no multiple of 4")
         if at + 8 + size > len(data):
             raise CorruptError(f"a chunk says {size} bytes, the file holds {len(data) - at - 8}")
         chunks.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + size]))
         at += 8 + size
     if chunks[0][0] != b"JSON":
         raise CorruptError("the first chunk is not JSON")
-    return chunks[0][1], next((body for kind, body in chunks[1:] if kind == b"BIN\0"), None)
+    if any(kind in (b"JSON", b"BIN\0") for kind, _ in chunks[2:]):
+        raise CorruptError("a chunk of JSON or of binary data is there twice, or too late")
+    return chunks[0][1], chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entry = dict(pairs)
+    if len(entry) < len(pairs):
+        raise CorruptError("an object of the JSON has a key twice")
+    return entry
 
 
 def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
     """The matrix (4, 4) of a node, from its matrix or its translation, rotation (x, y, z, w) and scale."""
     if "matrix" in node:
-        return np.array(node["matrix"], np.float64).reshape(4, 4).T
-    x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), np.float64)
+        if node.keys() & {"translation", "rotation", "scale"}:
+            raise CorruptError("a node has a matrix and another transform besides")
+        return _numbers(node["matrix"], 16, "matrix").reshape(4, 4).T
+    x, y, z, w = _numbers(node.get("rotation", [0, 0, 0, 1]), 4, "rotation")
     norm = x * x + y * y + z * z + w * w
-    s = 2.0 / norm if norm > 0 else 0.0
+    if abs(norm - 1.0) > _MAX_ROTATION_ERROR:
+        raise CorruptError(f"the rotation {node['rotation']} of a node is no unit quaternion")
+    s = 2.0 / norm
     result = np.eye(4)
     result[:3, :3] = [
         [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
         [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
         [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
     ]
-    result[:3, :3] *= np.array(node.get("scale", (1, 1, 1)), np.float64).reshape(1, 3)
-    result[:3, 3] = np.array(node.get("translation", (0, 0, 0)), np.float64).reshape(3)
+    result[:3, :3] *= _numbers(node.get("scale", [1, 1, 1]), 3, "scale")
+    result[:3, 3] = _numbers(node.get("translation", [0, 0, 0]), 3, "translation")
     return result
+
+
+def _numbers(values: object, count: int, name: str) -> NDArray[np.float64]:
+    if (
+        not isinstance(values, list)
+        or len(values) != count
+        or not all(type(x) in (int, float) for x in values)
+    ):
+        raise CorruptError(f"{name} is {str(values)[:60]}, but must be a list of {count} numbers")
+    return np.array(values, np.float64)
 
 
 def _triangles(indices: NDArray[np.int64], mode: int, vertices: int, mesh: object) -> NDArray[np.int64]:
@@ -392,17 +483,13 @@ def _triangles(indices: NDArray[np.int64], mode: int, vertices: int, mesh: objec
             f"face {face} (counted from 0) of mesh {mesh!r} has index {indices[corner]}, "
             f"but there are {vertices} vertices"
         )
+    if len(indices) < 3 or (mode == _TRIANGLES and len(indices) % 3):
+        raise CorruptError(f"mesh {mesh!r} has {len(indices)} indices, which make no triangles")
     if mode == _STRIP:
         return strip_triangles(indices, np.array([len(indices)]))
     if mode == _FAN:
-        middle = np.full(max(len(indices) - 2, 0), indices[0] if len(indices) else 0)
-        return (
-            np.stack([middle, indices[1:-1], indices[2:]], axis=1)
-            if len(middle)
-            else np.zeros((0, 3), np.int64)
-        )
-    if len(indices) % 3:
-        raise CorruptError(f"mesh {mesh!r} has {len(indices)} indices, which is no multiple of 3")
+        middle = np.full(len(indices) - 2, indices[0])
+        return np.stack([middle, indices[1:-1], indices[2:]], axis=1)
     return indices.reshape(-1, 3)
 
 
@@ -439,3 +526,9 @@ def _natural(value: object, name: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise CorruptError(f"{name} is {value!r}, but must be a whole number from 0 on")
     return value
+
+
+def _positive(value: object, name: str) -> int:
+    if _natural(value, name) == 0:
+        raise CorruptError(f"{name} is 0, but must be a whole number from 1 on")
+    return int(value)  # type: ignore[call-overload, no-any-return]

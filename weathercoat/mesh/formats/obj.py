@@ -1,42 +1,45 @@
 """Wavefront OBJ: polygons with texture coordinates, groups, materials and vertex colours.
 
 Source: Wavefront, Object Files (.obj), appendix B1 of the Advanced Visualizer manual; vertex colours after
-the position are the common extension of MeshLab and others. Free-form curves and surfaces are passed over.
+the position are the common extension of MeshLab and others. Free-form curves and surfaces are passed over;
+what calls another file or a command is refused.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
-from weathercoat.errors import CorruptError, Note
+from weathercoat.errors import CorruptError, Note, SecurityError, UnsupportedError
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.formats.text import Lines, decode_names, join_continued, normalise, pack
 
 PASSED_OVER = (
-    "l", "p", "s", "vp", "mtllib", "usemap", "maplib", "mg", "cstype", "deg", "bmat", "step", "curv", "curv2",
-    "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod",
-    "ctech", "stech", "call", "csh", "bsp", "bzp", "cdc", "cdp", "res", "vw",
+    "mtllib", "usemap", "maplib", "mg", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm",
+    "trim", "hole", "scrv", "sp", "end", "con", "bevel", "c_interp", "d_interp", "lod", "ctech", "stech",
+    "bsp", "bzp", "cdc", "cdp", "res", "vw",
 )  # fmt: skip
 # Longer than the eight characters that tell keywords apart.
 _LONG = {b"shadow_obj", b"trace_obj"}
-KEYWORDS = ("v", "vt", "vn", "f", "fo", "g", "o", "usemtl", *PASSED_OVER)
+KEYWORDS = ("v", "vt", "vn", "vp", "f", "fo", "l", "p", "s", "g", "o", "usemtl", "call", "csh", *PASSED_OVER)
 
 
 def read_obj(data: bytes, folder: Path | None) -> Polygons:
     """The polygons of an OBJ file. A missing material library beside it (in `folder`) is noted.
 
-    Errors: CorruptError, with the line or the face and index.
+    Errors: CorruptError, with the line or the face and index; UnsupportedError, SecurityError.
     """
     lines = Lines(join_continued(normalise(data)), keyed=True)
     _refuse_unknown(lines)
-    v, vt, vn = (np.flatnonzero(lines.keyword == pack(word)) for word in ("v", "vt", "vn"))
-    f = np.flatnonzero((lines.keyword == pack("f")) | (lines.keyword == pack("fo")))
+    v, vt, vn = (_lines_of(lines, word) for word in ("v", "vt", "vn"))
+    f = _lines_of(lines, "f", "fo")
     positions, colors = _vertices(lines, v)
-    corners, texture, sizes = _faces(lines, f, v, vt, vn)
+    _check_passed_over(lines, v, vt, vn)
+    corners, texture, sizes, notes = _faces(lines, f, v, vt, vn)
     face_group, groups = _groups(lines, f)
     polygons = Polygons(
         positions=positions,
@@ -46,10 +49,16 @@ def read_obj(data: bytes, folder: Path | None) -> Polygons:
         face_group=face_group,
         groups=groups,
         colors=colors,
+        notes=notes,
     )
     polygons.drop_illegal()
+    polygons.tidy_attributes()
     polygons.notes.extend(_missing_materials(lines, folder))
     return polygons
+
+
+def _lines_of(lines: Lines, *keywords: str) -> NDArray[np.int64]:
+    return np.flatnonzero(np.isin(lines.keyword, np.array([pack(word) for word in keywords], np.uint64)))
 
 
 def _refuse_unknown(lines: Lines) -> None:
@@ -59,6 +68,40 @@ def _refuse_unknown(lines: Lines) -> None:
         if text.lower() not in _LONG:
             word = text[:40].decode("utf-8", "replace")
             raise CorruptError(f"line {lines.number[line]}: {word!r} is no keyword of OBJ")
+    for line in _lines_of(lines, "call")[:1]:
+        raise UnsupportedError(f"line {lines.number[line]} includes another file")
+    for line in _lines_of(lines, "csh")[:1]:
+        raise SecurityError(
+            f"line {lines.number[line]} asks to run a command", remedy="export the model without it"
+        )
+
+
+def _check_passed_over(
+    lines: Lines, v: NDArray[np.int64], vt: NDArray[np.int64], vn: NDArray[np.int64]
+) -> None:
+    """Refuse what is no normal, point in parameters, line, point or smoothing group, though none is used: a
+    damaged line may have been a vertex or a face."""
+    for kind, fewest, most, name in (
+        (vt, 1, 3, "a texture coordinate has 1 to 3"),
+        (vn, 3, 3, "a normal has 3"),
+        (_lines_of(lines, "vp"), 1, 3, "a point in parameters has 1 to 3"),
+    ):
+        wrong = np.flatnonzero((lines.fields[kind] < fewest) | (lines.fields[kind] > most))
+        if len(wrong):
+            line = kind[wrong[0]]
+            raise CorruptError(f"line {lines.number[line]}: {name} numbers, this one {lines.fields[line]}")
+        lines.check_numbers(kind, lines.begin[kind])
+    others = _lines_of(lines, "l", "p")
+    illegal = np.flatnonzero(_indices(lines, others, v, vt, vn)[:, 0] == -1)
+    if len(illegal):
+        line = others[np.searchsorted(np.cumsum(lines.fields[others]), illegal[0], side="right")]
+        raise CorruptError(f"line {lines.number[line]}: index 0, but indices begin at 1")
+    for line in _lines_of(lines, "s").tolist():
+        if not re.fullmatch(rb"\d+|off|on", lines.text(line)):
+            raise CorruptError(
+                f"line {lines.number[line]}: a smoothing group is a number or off, not "
+                f"{lines.text(line)[:40].decode('utf-8', 'replace')!r}"
+            )
 
 
 def _vertices(lines: Lines, v: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -78,20 +121,37 @@ def _vertices(lines: Lines, v: NDArray[np.int64]) -> tuple[NDArray[np.float64], 
     colors = np.ones((len(v), 4))
     colored = np.flatnonzero(fields >= 6)
     colors[colored, :3] = values[(first + fields)[colored, None] - np.arange(3, 0, -1)]
-    return positions, np.clip(colors, 0.0, 1.0)
+    return positions, colors
 
 
 def _faces(
     lines: Lines, f: NDArray[np.int64], v: NDArray[np.int64], vt: NDArray[np.int64], vn: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], list[Note]]:
     """Vertex and texture index of each corner, from 0, -1 for the illegal index 0; corners of each face."""
+    indices = _indices(lines, f, v, vt, vn)
+    lost = indices[:, 1] == -1
+    # A file whose normals were stripped keeps the indices of all of them.
+    if len(vn):
+        lost |= (indices[:, 2] == -1) | (indices[:, 2] == BEFORE_FIRST) | (indices[:, 2] >= len(vn))
+    notes = []
+    if lost.any():
+        text = "corners name a texture coordinate or a normal that does not exist"
+        notes.append(Note("W-BADINDEX", int(lost.sum()), text))
+    return np.where(indices[:, 0] < 0, -1, indices[:, 0]), indices[:, 1], lines.fields[f], notes
+
+
+def _indices(
+    lines: Lines, f: NDArray[np.int64], v: NDArray[np.int64], vt: NDArray[np.int64], vn: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Indices (k, 3) of vertex, texture coordinate and normal of all corners on the lines `f`, from 0; -1,
+    ABSENT or BEFORE_FIRST for others. Refuses vertices and texture coordinates beyond the last."""
     sizes = lines.fields[f]
     indices = np.empty((int(sizes.sum()), 3), np.int64)
     before = np.stack([np.searchsorted(kind, f) for kind in (v, vt, vn)], axis=1).astype(np.int64)
     bad = _parse_corners(lines.buffer, lines.begin[f], lines.end[f], before, indices)
     if bad >= 0:
-        raise CorruptError(f"line {lines.number[f[bad]]}: {lines.text(f[bad])[:60]!r} is no list of indices")
-    # Indices of normals are not checked: files whose normals were stripped keep them, and they are not used.
+        shown = lines.text(f[bad])[:60].decode("utf-8", "replace")
+        raise CorruptError(f"line {lines.number[f[bad]]}: {shown!r} is no list of indices of one form")
     for column, (kind, name) in enumerate(((v, "vertices"), (vt, "texture coordinates"))):
         outside = np.flatnonzero((indices[:, column] >= len(kind)) | (indices[:, column] == BEFORE_FIRST))
         if len(outside):
@@ -102,17 +162,13 @@ def _faces(
                 f"face {face} (counted from 0), line {lines.number[f[face]]}: {which}, "
                 f"but there are {len(kind)} {name}"
             )
-    vertex = np.where(indices[:, 0] < 0, -1, indices[:, 0])
-    return vertex, indices[:, 1], sizes
+    return indices
 
 
 def _corner_uv(lines: Lines, vt: NDArray[np.int64], texture: NDArray[np.int64]) -> NDArray[np.float64] | None:
     if not len(vt) or not (texture >= 0).any():
         return None
     fields = lines.fields[vt]
-    wrong = np.flatnonzero((fields < 1) | (fields > 3))
-    if len(wrong):
-        raise CorruptError(f"line {lines.number[vt[wrong[0]]]}: a texture coordinate has 1 to 3 numbers")
     values = lines.numbers(vt)
     first = np.cumsum(fields) - fields
     coordinates = np.zeros((len(vt), 2))
@@ -122,7 +178,7 @@ def _corner_uv(lines: Lines, vt: NDArray[np.int64], texture: NDArray[np.int64]) 
     uv = np.zeros((len(texture), 2))
     has = texture >= 0
     uv[has] = coordinates[texture[has]]
-    return np.nan_to_num(uv, posinf=0.0, neginf=0.0)
+    return uv
 
 
 def _groups(lines: Lines, f: NDArray[np.int64]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
@@ -141,11 +197,11 @@ def _groups(lines: Lines, f: NDArray[np.int64]) -> tuple[NDArray[np.int32], tupl
 def number_groups(switch: NDArray[np.int64], names: list[str]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
     """Groups in the order of their first face: `switch` (m,) is an index into `names`, which may repeat."""
     used, first = np.unique(switch, return_index=True)
-    groups = list(dict.fromkeys(names[s] for s in used[np.argsort(first, kind="stable")]))
+    place: dict[str, int] = {}
     number = np.zeros(len(names), np.int32)
-    for s in used:
-        number[s] = groups.index(names[s])
-    return number[switch], tuple(groups) or ("default",)
+    for s in used[np.argsort(first, kind="stable")].tolist():
+        number[s] = place.setdefault(names[s], len(place))
+    return number[switch], tuple(place) or ("default",)
 
 
 def _missing_materials(lines: Lines, folder: Path | None) -> list[Note]:
@@ -176,7 +232,8 @@ BEFORE_FIRST = -3
 
 @kernel
 def _parse_corners(buffer, begin, end, before, indices):  # type: ignore[no-untyped-def]
-    """Indices v/vt/vn of each corner, from 0, into `indices` (k, 3); the first line that is no list, or -1.
+    """Indices v/vt/vn of each corner, from 0, into `indices` (k, 3); the first line that is no list of
+    corners of one form, or -1.
 
     Relative (negative) indices count back from the elements `before` the line. -1 stands for the illegal
     index 0, ABSENT for none, BEFORE_FIRST for a relative index that is too large.
@@ -184,10 +241,12 @@ def _parse_corners(buffer, begin, end, before, indices):  # type: ignore[no-unty
     corner = 0
     for line in range(len(begin)):
         i = begin[line]
+        form_of_line = -1
         while i < end[line]:
             if buffer[i] == 32 or 9 <= buffer[i] <= 13:
                 i += 1
                 continue
+            form = 0
             indices[corner, 0] = -2
             indices[corner, 1] = -2
             indices[corner, 2] = -2
@@ -206,6 +265,7 @@ def _parse_corners(buffer, begin, end, before, indices):  # type: ignore[no-unty
                 if digits > 17 or (digits == 0 and (negative or column == 0)):
                     return line
                 if digits > 0:
+                    form |= 4 << column
                     if value == 0:
                         indices[corner, column] = -1
                     elif not negative:
@@ -223,5 +283,9 @@ def _parse_corners(buffer, begin, end, before, indices):  # type: ignore[no-unty
                 break
             if i < end[line] and not (buffer[i] == 32 or 9 <= buffer[i] <= 13):
                 return line
+            form |= column
+            if form_of_line >= 0 and form != form_of_line:
+                return line
+            form_of_line = form
             corner += 1
     return -1

@@ -38,8 +38,8 @@ def read_off(data: bytes) -> Polygons:
     filled = np.flatnonzero(lines.fields > 0)
     if not len(filled) or not 2 <= lines.fields[filled[0]] <= 3:
         raise CorruptError("the line with the counts of vertices, faces and edges is missing")
-    counts = lines.numbers(filled[:1])
-    if not np.all((counts >= 0) & (counts < 2**53) & (counts == np.floor(counts))):
+    counts = lines.text(filled[0]).split()
+    if not all(word.isdigit() and len(word) < 100 for word in counts):
         raise CorruptError(f"line {lines.number[filled[0]]}: counts are whole numbers from 0 on")
     vertex_count, face_count = int(counts[0]), int(counts[1])
     rows = filled[1:]
@@ -61,6 +61,7 @@ def read_off(data: bytes) -> Polygons:
     polygons.drop_illegal()
     if texture_coordinates is not None:
         polygons.uv = texture_coordinates[polygons.corners]
+    polygons.tidy_attributes()
     return polygons
 
 
@@ -70,39 +71,42 @@ def _vertices(
     """Positions, colours, texture coordinates: `before` numbers, a colour, `after` numbers a line."""
     fields = lines.fields[rows]
     allowed = [before + after + n for n in ((3, 4) if color else (0, 3, 4))]
-    wrong = np.flatnonzero(~np.isin(fields, allowed))
+    width = next((n for n in fields[:1].tolist() if n in allowed), allowed[0])
+    wrong = np.flatnonzero(fields != width)
     if len(wrong):
         row = rows[wrong[0]]
         raise CorruptError(
-            f"line {lines.number[row]}: a vertex has {allowed[0]} numbers, this one {lines.fields[row]}"
+            f"line {lines.number[row]}: a vertex has {width} numbers, this one {lines.fields[row]}"
         )
-    values = lines.numbers(rows)
-    first = np.cumsum(fields) - fields
-    positions = values[first[:, None] + np.arange(3)].reshape(-1, 3)
+    values = lines.numbers(rows).reshape(len(rows), width)
     colors = None
-    if len(fields) and (fields == fields[0]).all() and fields[0] > before + after:
-        part = values.reshape(len(rows), -1)[:, before : fields[0] - after]
+    if width > before + after:
+        part = values[:, before : width - after]
         colors = np.ones((len(rows), 4))
-        colors[:, : part.shape[1]] = part / 255.0 if part.max(initial=0.0) > 1.0 else part
-        colors = np.clip(colors, 0.0, 1.0)
-    coordinates = values[(first + fields)[:, None] - np.array([2, 1])] if after else None
-    return positions, colors, coordinates
+        finite = part[np.isfinite(part)]
+        colors[:, : part.shape[1]] = part / 255.0 if finite.max(initial=0.0) > 1.0 else part
+    return values[:, :3].copy(), colors, values[:, width - after :] if after else None
 
 
 def _faces(lines: Lines, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Corners and sizes; after the indices of a face stand 0, 1, 3 or 4 numbers of its colour."""
     sizes = np.zeros(len(rows), np.int64)
     corners = np.zeros(int(lines.fields[rows].sum()), np.int64)
-    used, bad = _parse_counted(lines.buffer, lines.begin[rows], lines.end[rows], sizes, corners)
-    if bad >= 0:
-        raise CorruptError(
-            f"line {lines.number[rows[bad]]}: {lines.text(rows[bad])[:60]!r} is no face of OFF"
-        )
+    after = np.zeros(len(rows), np.int64)
+    used, bad = _parse_counted(lines.buffer, lines.begin[rows], lines.end[rows], sizes, corners, after)
+    odd = np.flatnonzero(~np.isin(lines.fields[rows] - 1 - sizes, (0, 1, 3, 4))) if bad < 0 else [bad]
+    if len(odd):
+        row = rows[odd[0]]
+        shown = lines.text(row)[:60].decode("utf-8", "replace")
+        raise CorruptError(f"line {lines.number[row]}: {shown!r} is no face of OFF")
+    lines.check_numbers(rows, after)
     return corners[:used], sizes
 
 
 @kernel
-def _parse_counted(buffer, begin, end, sizes, corners):  # type: ignore[no-untyped-def]
-    """Lines "count index index ...", then perhaps a colour. Corners found, and the first bad line or -1."""
+def _parse_counted(buffer, begin, end, sizes, corners, after):  # type: ignore[no-untyped-def]
+    """Lines "count index index ...", then perhaps a colour, which begins at `after`. Corners found, and the
+    first bad line or -1."""
     used = 0
     for line in range(len(begin)):
         i = begin[line]
@@ -133,4 +137,5 @@ def _parse_counted(buffer, begin, end, sizes, corners):  # type: ignore[no-untyp
                 corners[used] = -value if negative else value
                 used += 1
             found += 1
+        after[line] = i
     return used, -1

@@ -6,6 +6,7 @@ serves both.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.errors import CorruptError
 from weathercoat.mesh.formats.polygons import Polygons
-from weathercoat.mesh.formats.text import count_words, normalise, parse_numbers
+from weathercoat.mesh.formats.text import Lines, normalise
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -52,6 +53,7 @@ class Column:
     values: NDArray[np.generic]
     sizes: NDArray[np.int64]
     type: str
+    is_list: bool
 
 
 def read_ply(data: bytes) -> Polygons:
@@ -59,11 +61,15 @@ def read_ply(data: bytes) -> Polygons:
 
     Errors: CorruptError with counts, line or index.
     """
-    order, elements, body = _header(data)
-    table = _read_ascii(data[body:], elements) if order == "=" else _read_binary(data[body:], elements, order)
-    if "vertex" not in table or not {"x", "y", "z"} <= table["vertex"].keys():
-        raise CorruptError("the header names no element vertex with x, y and z")
-    vertex = table["vertex"]
+    order, elements, body, line = _header(data)
+    if order == "=":
+        table = _read_ascii(data[body:], elements, line)
+    else:
+        table = _read_binary(data[body:], elements, order)
+    vertex = table.get("vertex", {})
+    for axis in "xyz":
+        if axis not in vertex or vertex[axis].is_list:
+            raise CorruptError(f"the header names no element vertex with a number {axis}")
     positions = np.stack([vertex[axis].values.astype(np.float64) for axis in "xyz"], axis=1)
     corners, sizes = _corners(table)
     polygons = Polygons(
@@ -76,70 +82,111 @@ def read_ply(data: bytes) -> Polygons:
         single_precision=order != "=" and vertex["x"].type == "f4",
     )
     polygons.drop_illegal()
+    polygons.tidy_attributes()
     return polygons
 
 
-def _header(data: bytes) -> tuple[ByteOrder, list[Element], int]:
-    """Byte order, elements, and where the body begins."""
-    end = data.find(b"end_header", 0, _MAX_HEADER)
-    stop = min((i for i in (data.find(b"\n", end), data.find(b"\r", end)) if i >= 0), default=-1)
-    if end < 0 or stop < 0:
-        raise CorruptError("the header has no end")
-    body = stop + (2 if data[stop : stop + 2] == b"\r\n" else 1)
-    lines = data[:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n").decode("latin-1").split("\n")
+def _header(data: bytes) -> tuple[ByteOrder, list[Element], int, int]:
+    """Byte order, elements, where the body begins, and in which line, counted from 1."""
+    # A carriage return alone ends the lines of old files; one before a line feed is a blank.
+    end = b"\r" if data[3:4] == b"\r" and data[4:5] != b"\n" else b"\n"
     order: ByteOrder | None = None
     elements: list[Element] = []
-    for number, line in enumerate(lines, 1):
+    at = 0
+    for number in range(1, _MAX_HEADER):
+        stop = data.find(end, at, _MAX_HEADER)
+        if stop < 0:
+            break
+        line = data[at:stop].decode("latin-1")
+        at = stop + 1
         words = line.split()
-        if number == 1 or not words or words[0] in ("comment", "obj_info"):
+        if words == ["end_header"]:
+            if order is None:
+                raise CorruptError("the header names no format")
+            for element in elements:
+                if element.count and not element.properties:
+                    raise CorruptError(f"the header names no property of element {element.name}")
+            return order, elements, at, number + 1
+        if (words == ["ply"] and number == 1) or not words or words[0] in ("comment", "obj_info"):
             continue
         try:
-            if words[0] == "format" and words[2] == "1.0":
+            if words[0] == "format" and words[2:] == ["1.0"] and order is None:
                 order = _ORDERS[words[1]]
-            elif words[0] == "element":
-                count = int(words[2])
-                if count < 0:
-                    raise ValueError
-                elements.append(Element(words[1], count, []))
-            elif words[0] == "property" and words[1] == "list":
-                elements[-1].properties.append(Property(words[4], _TYPES[words[3]], _TYPES[words[2]]))
-            elif words[0] == "property":
-                elements[-1].properties.append(Property(words[2], _TYPES[words[1]]))
             else:
-                raise ValueError
+                _declare(words, elements)
         except (KeyError, IndexError, ValueError):
             raise CorruptError(f"line {number} of the header: {line[:60]!r}") from None
-    if order is None:
-        raise CorruptError("the header names no format")
-    return order, elements, body
+    raise CorruptError("the header has no end")
 
 
-def _read_ascii(body: bytes, elements: list[Element]) -> dict[str, dict[str, Column]]:
+def _declare(words: list[str], elements: list[Element]) -> None:
+    """Add what a line of the header declares; KeyError, IndexError or ValueError where it is none."""
+    if words[0] == "element":
+        _, name, count = words
+        if not re.fullmatch(r"[0-9]{1,99}", count) or any(name == element.name for element in elements):
+            raise ValueError
+        elements.append(Element(name, int(count), []))
+        return
+    if words[:2] == ["property", "list"]:
+        _, _, count_type, type, name = words
+        new = Property(name, _TYPES[type], _TYPES[count_type])
+        if _TYPES[count_type][0] == "f":
+            raise ValueError
+    else:
+        keyword, type, name = words
+        new = Property(name, _TYPES[type])
+        if keyword != "property":
+            raise ValueError
+    if any(new.name == other.name for other in elements[-1].properties):
+        raise ValueError
+    elements[-1].properties.append(new)
+
+
+def _read_ascii(body: bytes, elements: list[Element], first_line: int) -> dict[str, dict[str, Column]]:
+    """The values of a text body: a line for each row of each element."""
     text = normalise(body)
     for element in elements:
         _check_room(element, 2 * max(len(element.properties), 1), len(text) + 1)
-    words = count_words(np.frombuffer(text, np.uint8))
-    values = parse_numbers(text, int(words))
-    if values is None:
-        for number, line in enumerate(text.split(b"\n"), 1):
-            if parse_numbers(line, len(line.split())) is None:
-                raise CorruptError(f"line {number} after the header: {line[:60]!r} are no numbers")
-        raise CorruptError("something after the header is no number")
+    lines = Lines(text, keyed=False, comments=False)
+    lines.number += first_line - 1
+    filled = np.flatnonzero(lines.fields)
+    values = lines.numbers(filled)
     rows = [
         Element(e.name, e.count, [Property(p.name, "f8", p.count_type and "f8") for p in e.properties])
         for e in elements
     ]
     table = _read_binary(values.tobytes(), rows, "=")
     for element in elements:
+        words = np.zeros(element.count, np.int64)
         for declared in element.properties:
             column = table[element.name][declared.name]
             column.type = declared.type
+            words += column.sizes + column.is_list
             if declared.type[0] in "iu":
-                whole = np.asarray(column.values, np.float64)
-                if not np.all(np.abs(whole) < 2.0**53) or np.any(whole != np.trunc(whole)):
-                    raise CorruptError(f"element {element.name}: {declared.name} holds no whole numbers")
-                column.values = whole.astype(np.int64)
+                column.values = _whole_numbers(column.values.astype(np.float64), element, declared)
+        wrong = np.flatnonzero(lines.fields[filled[: element.count]] != words)
+        if len(wrong):
+            line = filled[wrong[0]]
+            raise CorruptError(
+                f"line {lines.number[line]}: a row of element {element.name} of {words[wrong[0]]} words, "
+                f"this line has {lines.fields[line]}"
+            )
+        filled = filled[element.count :]
     return table
+
+
+def _whole_numbers(values: NDArray[np.float64], element: Element, declared: Property) -> NDArray[np.int64]:
+    """Values of a text body that were declared as whole numbers; an index may be negative all the same, since
+    that is illegal and noted as such."""
+    limits = np.iinfo(declared.type)
+    low = -(2**53) if declared.name in _INDEX_NAMES else limits.min
+    good = (values >= low) & (values <= limits.max) & (values == np.trunc(values))
+    if not good.all():
+        raise CorruptError(
+            f"element {element.name}: {declared.name} is {values[np.argmin(good)]:g}, "
+            f"but declared as a whole number from {limits.min} to {limits.max}"
+        )
+    return values.astype(np.int64)
 
 
 def _read_binary(body: bytes, elements: list[Element], order: ByteOrder) -> dict[str, dict[str, Column]]:
@@ -163,9 +210,10 @@ def _read_binary(body: bytes, elements: list[Element], order: ByteOrder) -> dict
         for i, p in enumerate(element.properties):
             raw = np.empty(int(sizes[i].sum()) * item[i], np.uint8)
             _gather(buffer, offsets[i], sizes[i] * item[i], raw)
-            columns[p.name] = Column(raw.view(np.dtype(p.type).newbyteorder(order)), sizes[i], p.type)
+            values = raw.view(np.dtype(p.type).newbyteorder(order))
+            columns[p.name] = Column(values, sizes[i], p.type, p.count_type is not None)
         table[element.name] = columns
-    if body[at : at + 64].strip(b"\0 \t\r\n") or len(body) - at > 64:
+    if body[at:] not in (b"", b"\n", b"\r\n"):
         raise CorruptError(f"{len(body) - at} bytes follow the last row that the header announces")
     return table
 
@@ -180,12 +228,10 @@ def _check_room(element: Element, least_bytes: int, room: int) -> None:
 
 
 def _count_code(count_type: str | None) -> int:
-    """0 for a number, else the bytes of a list's count: negative where signed, 8 for float64."""
+    """0 for a number, else the bytes of a list's count: negative where signed, 8 for float64 (of text)."""
     if count_type is None:
         return 0
     size = np.dtype(count_type).itemsize
-    if count_type[0] == "f" and size != 8:
-        raise CorruptError("the count of a list is declared as float")
     return -size if count_type[0] == "i" else size
 
 
@@ -209,8 +255,8 @@ def _corners(table: dict[str, dict[str, Column]]) -> tuple[NDArray[np.int64], ND
 def _index_column(element: dict[str, Column]) -> Column | None:
     for name in _INDEX_NAMES:
         if name in element:
-            if element[name].type[0] == "f":
-                raise CorruptError(f"{name} is declared as float")
+            if element[name].type[0] == "f" or not element[name].is_list:
+                raise CorruptError(f"{name} is declared as something else than a list of whole numbers")
             return element[name]
     return None
 
@@ -235,8 +281,8 @@ def strip_triangles(indices: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDA
 def _colors(vertex: dict[str, Column]) -> NDArray[np.float64] | None:
     for prefix in ("", "diffuse_"):
         names = [prefix + name for name in ("red", "green", "blue")]
-        if all(name in vertex for name in names):
-            if prefix + "alpha" in vertex:
+        if all(name in vertex and not vertex[name].is_list for name in names):
+            if prefix + "alpha" in vertex and not vertex[prefix + "alpha"].is_list:
                 names.append(prefix + "alpha")
             break
     else:
@@ -245,7 +291,7 @@ def _colors(vertex: dict[str, Column]) -> NDArray[np.float64] | None:
     for i, name in enumerate(names):
         scale = {"u1": 255.0, "u2": 65535.0}.get(vertex[name].type, 1.0)
         colors[:, i] = vertex[name].values.astype(np.float64) / scale
-    return np.clip(np.nan_to_num(colors), 0.0, 1.0)
+    return colors
 
 
 def _corner_uv(
@@ -254,12 +300,16 @@ def _corner_uv(
     """Texture coordinates from the faces' own lists (u v u v ...), else from the vertices."""
     own = table.get("face", {}).get("texcoord")
     if own is not None and len(own.sizes) == len(sizes) and np.array_equal(own.sizes, 2 * sizes):
-        return np.nan_to_num(own.values.astype(np.float64).reshape(-1, 2), posinf=0.0, neginf=0.0)
+        return own.values.astype(np.float64).reshape(-1, 2)
     vertex = table["vertex"]
     for u, v in _UV_NAMES:
-        if u in vertex and v in vertex and len(vertex[u].values):
+        if (
+            u in vertex
+            and v in vertex
+            and len(vertex[u].values)
+            and not vertex[u].is_list | vertex[v].is_list
+        ):
             per_vertex = np.stack([vertex[u].values, vertex[v].values], axis=1).astype(np.float64)
-            per_vertex = np.nan_to_num(per_vertex, posinf=0.0, neginf=0.0)
             return per_vertex[np.clip(corners, 0, len(per_vertex) - 1)]
     return None
 

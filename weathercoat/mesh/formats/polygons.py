@@ -59,6 +59,17 @@ class Polygons:
         dropped = int((~keep).sum())
         self.notes.append(Note("W-BADINDEX", dropped, "faces with an illegal index were dropped"))
 
+    def tidy_attributes(self) -> None:
+        """Make texture coordinates and colours zero where they are not finite, with a note; clip colours."""
+        for values, name in ((self.uv, "texture coordinates"), (self.colors, "colours")):
+            broken = None if values is None else np.logical_not(np.isfinite(values).all(axis=1))
+            if values is not None and broken is not None and broken.any():
+                values[broken] = 0.0
+                text = f"{name} are not finite and were set to zero"
+                self.notes.append(Note("W-NONFINITE", int(broken.sum()), text))
+        if self.colors is not None:
+            np.clip(self.colors, 0.0, 1.0, out=self.colors)
+
     def keep_faces(self, keep: NDArray[np.bool_]) -> None:
         """Drop the faces where `keep` (m,) is false."""
         keep_corner = np.repeat(keep, self.sizes)

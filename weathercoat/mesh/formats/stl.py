@@ -6,16 +6,23 @@ well: their size tells.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.errors import CorruptError
 from weathercoat.mesh.formats.obj import number_groups
 from weathercoat.mesh.formats.polygons import Polygons
-from weathercoat.mesh.formats.text import Lines, decode_names, normalise, pack
+from weathercoat.mesh.formats.text import Lines, decode_names, is_number, normalise, pack
 
 HEADER_BYTES = 84
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _FACET_LINES = ("facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet")
+# Words that follow on each of these lines.
+_WORDS = (4, 1, 3, 3, 3, 0, 0)
+# Normals of faces without area are written in many ways that are no numbers; they are not used.
+_NO_NUMBER = re.compile(rb"nan|inf|ind|#", re.IGNORECASE)
 
 
 def is_binary_stl(data: bytes) -> bool:
@@ -75,26 +82,61 @@ def _soup(positions: np.ndarray, *, single_precision: bool) -> Polygons:
 
 
 def _read_text(data: bytes) -> Polygons:
-    lines = Lines(normalise(data), keyed=True)
-    solid, endsolid = pack("solid"), pack("endsolid")
+    lines = Lines(normalise(data), keyed=True, any_case=True, comments=False)
     filled = np.flatnonzero(lines.keyword != 0)
-    facet_lines = filled[(lines.keyword[filled] != solid) & (lines.keyword[filled] != endsolid)]
-    begins = np.flatnonzero(lines.keyword == solid)
-    ends = np.flatnonzero(lines.keyword == endsolid)
+    frame = np.flatnonzero(np.isin(lines.keyword, np.array([pack("solid"), pack("endsolid")], np.uint64)))
+    facet_lines = np.setdiff1d(filled, frame, assume_unique=True)
     expected = np.resize(np.array([pack(word) for word in _FACET_LINES], np.uint64), len(facet_lines))
     wrong = np.flatnonzero(lines.keyword[facet_lines] != expected)
     if len(wrong):
         word = _FACET_LINES[wrong[0] % len(_FACET_LINES)]
         raise CorruptError(f"line {lines.number[facet_lines[wrong[0]]]}: expected {word!r}")
-    if len(facet_lines) % len(_FACET_LINES) or len(begins) != len(ends) or (begins > ends).any():
-        whole = len(facet_lines) // len(_FACET_LINES)
-        raise CorruptError(f"the file ends within a solid, after {whole} whole faces")
-    vertex = facet_lines.reshape(-1, len(_FACET_LINES))[:, 2:5].ravel()
-    short = np.flatnonzero(lines.fields[vertex] != 3)
-    if len(short):
-        raise CorruptError(f"line {lines.number[vertex[short[0]]]}: a vertex has 3 coordinates")
+    whole = len(facet_lines) // len(_FACET_LINES)
+    begins = _solids(lines, frame, facet_lines, whole)
+    facet = facet_lines.reshape(-1, len(_FACET_LINES))
+    _check_words(lines, facet)
+    vertex = facet[:, 2:5].ravel()
     polygons = _soup(lines.numbers(vertex).reshape(-1, 3), single_precision=False)
     names = decode_names([lines.text(line) for line in begins.tolist()])
     names = ["default", *(name or "default" for name in names)]
     polygons.face_group, polygons.groups = number_groups(np.searchsorted(begins, vertex[::3]), names)
     return polygons
+
+
+def _solids(
+    lines: Lines, frame: NDArray[np.int64], facet_lines: NDArray[np.int64], whole: int
+) -> NDArray[np.int64]:
+    """The lines that begin a solid; refuses facets outside, solids that do not end, and frames in a facet."""
+    place = np.searchsorted(facet_lines, frame)
+    order = np.resize(np.array([pack("solid"), pack("endsolid")], np.uint64), len(frame))
+    good = (lines.keyword[frame] == order) & (place % len(_FACET_LINES) == 0)
+    good[::2] &= place[::2] == np.concatenate([[0], place[1:-1:2]])[: len(place[::2])]
+    if not good.all():
+        raise CorruptError(
+            f"line {lines.number[frame[np.argmin(good)]]}: a solid begins or ends here wrongly"
+        )
+    if len(frame) % 2 or len(facet_lines) % len(_FACET_LINES) or place[-1] < len(facet_lines):
+        raise CorruptError(f"the file ends within a solid, after {whole} whole faces")
+    return frame[::2]
+
+
+def _check_words(lines: Lines, facet: NDArray[np.int64]) -> None:
+    """Refuse lines of facets (m, 7) with words too many, too few or not in their place."""
+    for column, count in enumerate(_WORDS):
+        rows = facet[:, column]
+        wrong = lines.fields[rows] != count
+        if column == 0 and not wrong.any():
+            wrong = ~lines.begins_with(rows, b"normal ")
+        if column == 1 and not wrong.any():
+            wrong = ~lines.begins_with(rows, b"loop") | (lines.end[rows] - lines.begin[rows] != len("loop"))
+        for row in rows[wrong]:
+            _refuse_line(lines, row, _FACET_LINES[column])
+    rows = facet[:, 0]
+    for row in rows[~lines.are_numbers(rows, lines.begin[rows] + len("normal"))]:
+        if not all(_NO_NUMBER.search(word) or is_number(word) for word in lines.text(row).split()[1:]):
+            _refuse_line(lines, row, "facet")
+
+
+def _refuse_line(lines: Lines, row: int, keyword: str) -> None:
+    shown = lines.text(row)[:60].decode("utf-8", "replace")
+    raise CorruptError(f"line {lines.number[row]}: {shown!r} cannot follow {keyword!r}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.errors import CorruptError
 
-_NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_NAN, _INFINITY = (np.frombuffer(word, np.uint8) for word in (b"nan", b"infinity"))
 
 
 def normalise(data: bytes) -> bytes:
@@ -54,18 +53,20 @@ def decode_names(names: list[bytes]) -> list[str]:
 
 def pack(keyword: str) -> int:
     """A keyword of at most eight characters as the number that `Lines.keyword` holds for it."""
-    return int.from_bytes(keyword.lower().encode(), "big")
+    return int.from_bytes(keyword.encode(), "big")
 
 
 class Lines:
     """Where the lines of a text begin and end, without blanks at their ends and comments.
 
-    keyword: uint64 (l,), the first word in lower case, packed; 0 for an empty line or where `keyed` is false.
+    keyed: the first word is a keyword; any_case: upper case is as good as lower; comments: a word that begins
+    with # makes the rest of its line a comment.
+    keyword: uint64 (l,), the first word, packed; 0 for an empty line or where `keyed` is false.
     begin, end: int64 (l,), the rest of the line in `buffer`; fields: int64 (l,), the number of words in it.
     number: int64 (l,), the line's number in the file, counted from 1.
     """
 
-    def __init__(self, data: bytes, *, keyed: bool) -> None:
+    def __init__(self, data: bytes, *, keyed: bool, any_case: bool = False, comments: bool = True) -> None:
         self.data = data
         self.buffer = np.frombuffer(data, np.uint8)
         breaks = np.flatnonzero(self.buffer == ord("\n"))
@@ -76,7 +77,9 @@ class Lines:
         self.begin = np.zeros(len(starts), np.int64)
         self.end = np.zeros(len(starts), np.int64)
         self.fields = np.zeros(len(starts), np.int64)
-        _split_lines(self.buffer, starts, stops, keyed, self.keyword, self.begin, self.end, self.fields)
+        case, mark = (32 if any_case else 0), (ord("#") if comments else -1)
+        table = (self.keyword, self.begin, self.end, self.fields)
+        _split_lines(self.buffer, starts, stops, keyed, case, mark, *table)
 
     def text(self, line: int) -> bytes:
         """The rest of a line after its keyword."""
@@ -87,29 +90,45 @@ class Lines:
 
         Errors: CorruptError with the number of the first line that holds something else.
         """
+        self.check_numbers(lines, self.begin[lines])
         begin, end = self.begin[lines], self.end[lines]
         joined = np.empty(int((end - begin).sum()) + len(lines), np.uint8)
         _join(self.buffer, begin, end, joined)
-        values = parse_numbers(joined.tobytes(), int(self.fields[lines].sum()))
-        if values is not None:
-            return values
-        for line in lines:
-            for word in self.text(line).split():
-                if not _NUMBER.fullmatch(word):
-                    raise CorruptError(f"line {self.number[line]}: {_shown(word)} is no number")
-        raise CorruptError(f"line {self.number[lines[0]]} ff.: something is no number")
+        return np.fromstring(joined.tobytes(), np.float64, sep=" ")  # type: ignore[no-any-return]
+
+    def check_numbers(self, lines: NDArray[np.int64], begin: NDArray[np.int64]) -> None:
+        """Whether all words of the given lines, each from `begin` in `buffer` on, are numbers.
+
+        Errors: CorruptError with the number of the first line that holds something else.
+        """
+        good = self.are_numbers(lines, begin)
+        if not good.all():
+            first = int(np.argmin(good))
+            words = self.data[begin[first] : self.end[lines[first]]].split()
+            word = next(word for word in words if not is_number(word))
+            raise CorruptError(f"line {self.number[lines[first]]}: {_shown(word)} is no number")
+
+    def are_numbers(self, lines: NDArray[np.int64], begin: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """For each of the lines, whether all words from `begin` in `buffer` on are numbers."""
+        good = np.empty(len(lines), np.bool_)
+        _find_numbers(self.buffer, begin, self.end[lines], good)
+        return good
+
+    def begins_with(self, lines: NDArray[np.int64], word: bytes) -> NDArray[np.bool_]:
+        """For each of the lines, whether the rest begins with `word`, in whatever case and with any blank."""
+        place = np.minimum(self.begin[lines, None] + np.arange(len(word)), len(self.buffer) - 1)
+        found = self.buffer[place]
+        letters = np.where((found >= 65) & (found <= 90), found + 32, found)
+        letters[(found >= 9) & (found <= 13)] = 32
+        fits = self.end[lines] - self.begin[lines] >= len(word)
+        return fits & (letters == np.frombuffer(word, np.uint8)).all(axis=1)  # type: ignore[no-any-return]
 
 
-def parse_numbers(text: bytes, count: int) -> NDArray[np.float64] | None:
-    """The `count` numbers that `text` holds between blanks, or None where it holds anything else."""
-    with warnings.catch_warnings():
-        # NumPy 1 warns and stops at the first word that is no number, NumPy 2 raises.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        try:
-            values = np.fromstring(text, dtype=np.float64, sep=" ")
-        except ValueError:
-            return None
-    return values if len(values) == count else None
+def is_number(word: bytes) -> bool:
+    """Whether a word is a number: sign, digits, point, digits, exponent; or nan, inf, infinity."""
+    good = np.empty(1, np.bool_)
+    _find_numbers(np.frombuffer(word, np.uint8), np.zeros(1, np.int64), np.array([len(word)]), good)
+    return bool(good[0])
 
 
 def _shown(word: bytes) -> str:
@@ -117,34 +136,70 @@ def _shown(word: bytes) -> str:
 
 
 @kernel
-def count_words(buffer):  # type: ignore[no-untyped-def]
-    """The number of words in `buffer`, uint8 (k,), between blanks and line ends."""
-    words = 0
-    inside = False
-    for c in buffer:
-        blank = c == 32 or (9 <= c <= 13)
-        if inside and blank:
-            inside = False
-        elif not inside and not blank:
-            inside = True
-            words += 1
-    return words
+def _find_numbers(buffer, begin, end, good):  # type: ignore[no-untyped-def]
+    for row in range(len(begin)):
+        i = begin[row]
+        stop = end[row]
+        good[row] = True
+        while i < stop and good[row]:
+            if buffer[i] == 32 or 9 <= buffer[i] <= 13:
+                i += 1
+                continue
+            if buffer[i] == 43 or buffer[i] == 45:
+                i += 1
+            digits = 0
+            begins = i
+            while i < stop and 48 <= buffer[i] <= 57:
+                i += 1
+                digits += 1
+            if i < stop and buffer[i] == 46:
+                i += 1
+                while i < stop and 48 <= buffer[i] <= 57:
+                    i += 1
+                    digits += 1
+            if i == begins:
+                digits = max(_matching(buffer, i, stop, _NAN, 3), _matching(buffer, i, stop, _INFINITY, 3))
+                i += digits
+            elif digits > 0 and i < stop and (buffer[i] == 69 or buffer[i] == 101):
+                i += 1
+                if i < stop and (buffer[i] == 43 or buffer[i] == 45):
+                    i += 1
+                digits = 0
+                while i < stop and 48 <= buffer[i] <= 57:
+                    i += 1
+                    digits += 1
+            good[row] = digits > 0 and (i >= stop or buffer[i] == 32 or 9 <= buffer[i] <= 13)
 
 
 @kernel
-def _split_lines(buffer, starts, stops, keyed, keyword, begin, end, fields):  # type: ignore[no-untyped-def]
+def _matching(buffer, i, stop, word, least):  # type: ignore[no-untyped-def]
+    """`least` or all letters of `word`, if so many stand at `i` in whatever case, else 0."""
+    n = 0
+    while n < len(word) and i + n < stop and buffer[i + n] | 32 == word[n]:
+        n += 1
+    if n == len(word):
+        return n
+    return least if n >= least else 0
+
+
+@kernel
+def _split_lines(buffer, starts, stops, keyed, case, mark, keyword, begin, end, fields):  # type: ignore[no-untyped-def]
+    """`case` is added to capital letters of keywords; `mark` at the begin of a word begins a comment."""
     for line in range(len(starts)):
         i = starts[line]
         stop = stops[line]
         while i < stop and (buffer[i] == 32 or 9 <= buffer[i] <= 13):
             i += 1
         word = np.uint64(0)
-        if keyed and i < stop and buffer[i] != 35:
+        if keyed and i < stop and buffer[i] != mark:
             length = 0
             while i < stop and not (buffer[i] == 32 or 9 <= buffer[i] <= 13):
                 c = buffer[i]
                 if 65 <= c <= 90:
-                    c += 32
+                    c += case
+                # A zero byte would vanish from the packed word.
+                if c == 0:
+                    length = 8
                 word = (word << np.uint64(8)) | np.uint64(c)
                 length += 1
                 i += 1
@@ -160,7 +215,7 @@ def _split_lines(buffer, starts, stops, keyed, keyword, begin, end, fields):  # 
             c = buffer[i]
             if c == 32 or 9 <= c <= 13:
                 inside = False
-            elif not inside and c == 35:
+            elif not inside and c == mark:
                 break
             else:
                 if not inside:
