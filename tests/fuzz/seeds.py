@@ -65,8 +65,7 @@ def make_seeds() -> list[Seed]:
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr(zipfile.ZipInfo("cube.obj"), _OBJ_TEXTS[0])
     seeds.append(Seed("cube.zip", "zip", archive.getvalue()))
-    seeds += [Seed(f"other.{extension}", extension, data) for extension, data in _foreign()]
-    return seeds
+    return seeds + foreign_seeds()
 
 
 def real_seeds() -> list[Seed]:
@@ -243,8 +242,8 @@ def _gltf_documents() -> list[dict[str, Any]]:
     return [plain, scene]
 
 
-def _foreign() -> list[tuple[str, bytes]]:
-    """Formats that meshio reads, by hand."""
+def foreign_seeds() -> list[Seed]:
+    """Formats that meshio reads, by hand: a square of two triangles each."""
     vtk = (
         "# vtk DataFile Version 3.0\nplate\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n"
         "0 0 0\n1 0 0\n1 1 0\n0 1 0\nCELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n5\n5\n"
@@ -257,4 +256,5 @@ def _foreign() -> list[tuple[str, bytes]]:
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
         "$Elements\n2\n1 2 2 0 1 1 2 3\n2 2 2 0 1 1 3 4\n$EndElements\n"
     )
-    return [("vtk", vtk.encode()), ("mesh", medit.encode()), ("msh", gmsh.encode())]
+    texts = {"vtk": vtk, "mesh": medit, "msh": gmsh}
+    return [Seed(f"other.{extension}", extension, text.encode()) for extension, text in texts.items()]
