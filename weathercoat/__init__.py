@@ -13,10 +13,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from weathercoat.api import read, remesh, simulate, write
+    from weathercoat.api import read, remesh, simulate, verify, write
 
 __version__ = "0.1.0"
-__all__ = ["read", "remesh", "simulate", "write"]
+__all__ = ["read", "remesh", "simulate", "verify", "write"]
 
 
 def __getattr__(name: str) -> Any:

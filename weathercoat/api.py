@@ -1,4 +1,4 @@
-"""The Python interface: read, remesh, simulate, write, each a call."""
+"""The Python interface: read, remesh, simulate, write, verify, each a call."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from weathercoat.run import prepare_simulation
 from weathercoat.sim.recorders import run_simulation
 from weathercoat.sim.simulation import Simulation
 from weathercoat.sim.snapshot import Snapshot
+from weathercoat.verification.run import Verification, verify_run
 
 
 def read(
@@ -81,3 +82,12 @@ def write(path: str | os.PathLike[str], content: Surface | Snapshot) -> None:
             file=str(path),
             remedy="use .ply, .glb or .png",
         )
+
+
+def verify(folder: str | os.PathLike[str]) -> Verification:
+    """Prove the folder of a finished run whole, or find what is wrong with it.
+
+    The result has `is_whole`, `findings` (each with `check`, `file` and `message`), and how many `files`,
+    `snapshots` and `checks` there were. Raises `weathercoat.errors.AccessError` where there is no run.
+    """
+    return verify_run(os.fspath(folder))

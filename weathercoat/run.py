@@ -24,8 +24,16 @@ from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
 from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder
+from weathercoat.output.lock import LOCK
 from weathercoat.output.meshes import write_mesh
-from weathercoat.output.report import make_report, make_timing, measure_surface, sha256, write_json
+from weathercoat.output.report import (
+    make_report,
+    make_timing,
+    manifest,
+    measure_surface,
+    sha256,
+    write_json,
+)
 from weathercoat.plan import Plan, make_plan
 from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
 from weathercoat.resume import identify, read_finished, recorded_figures, take_up
@@ -33,9 +41,18 @@ from weathercoat.sim.recorders import Patience, Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
 from weathercoat.stain.color import Palette
 from weathercoat.stain.rust import StainParameters
+from weathercoat.verification.run import require_whole
 
 _Parameters = TypeVar("_Parameters", FilmParameters, DeformParameters, StainParameters)
-_AROUND = ("read", "remesh", "prepare", "checkpoint", "write", "pictures")  # what is timed beside the steps
+_AROUND = (
+    "read",
+    "remesh",
+    "prepare",
+    "checkpoint",
+    "write",
+    "pictures",
+    "check",
+)  # what is timed beside the steps
 
 
 @dataclass(frozen=True)
@@ -64,6 +81,7 @@ def run_asset(
     overwrite: bool = False,
     resume: bool = False,
     strict: bool = False,
+    check: bool = True,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
     log: Callable[[str], None] | None = None,
@@ -74,7 +92,8 @@ def run_asset(
 
     model: a path, or a binary stream, for which `format` may be given. resume: go on from what an
     interrupted run left in `OUT.partial`, or extend the finished run in `out`; begin where there is neither.
-    strict: any warning ends the run with StrictError. threads: how many share a step's work; their number
+    strict: any warning ends the run with StrictError. check: whether the result is verified before the folder
+    is put in place; CheckError where it is not whole. threads: how many share a step's work; their number
     changes no result. progress: called with the steps done and their number. log: called with each warning
     and with what was done, a line each. patience: entered while steps are made; where it is asked to stop, a
     checkpoint is written first. Errors: those of reading, of remeshing, of `resume`, and of
@@ -129,8 +148,12 @@ def run_asset(
             stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
             solver=asdict(simulation.solving),
             snapshots=recorder.figures,
+            files=manifest(folder),
         )
         write_json(folder / REPORT, report)
+        if check:
+            with watch.time("check"), name_errors(intake.name):
+                require_whole(folder, ignored={LOCK})
         timing = make_timing(
             {**simulation.seconds, "mesh": watch.seconds.get("mesh", 0.0)},
             {key: watch.seconds.get(key, 0.0) for key in _AROUND},

@@ -153,6 +153,7 @@ def report(**changes: Any) -> dict[str, Any]:
         "stopped": "all steps are done",
         "solver": {"iterations": 10, "largest_gap": None, "unfinished_steps": 0},
         "snapshots": [measure_snapshot(make_snapshot(lost=2))],
+        "files": {"preview.png": "00"},
     }
     return make_report(**(content | changes))
 

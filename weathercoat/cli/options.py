@@ -78,6 +78,14 @@ resume = click.option(
 )
 overwrite = click.option("--overwrite", is_flag=True, help="Replace what is there.")
 strict = click.option("--strict", is_flag=True, help="Refuse a model that needs any repair.")
+no_check = click.option(
+    "--no-check",
+    "check",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    help="Do not verify the result at the end.",
+)
 log_file = click.option(
     "--log-file", type=click.Path(path_type=Path, dir_okay=False), help="Write all messages to a file too."
 )

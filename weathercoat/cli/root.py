@@ -20,6 +20,7 @@ _SUBCOMMANDS = (
     "inspect",
     "remesh",
     "render",
+    "verify",
     "warmup",
     "bench",
     "completion",

@@ -34,6 +34,7 @@ _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
 @options.overwrite
 @options.resume
 @options.strict
+@options.no_check
 @options.quiet
 @options.as_json
 @options.log_file
@@ -52,6 +53,7 @@ def command(
     overwrite: bool,
     resume: bool,
     strict: bool,
+    check: bool,
     quiet: bool,
     as_json: bool,
     log_file: Path | None,
@@ -88,6 +90,7 @@ def command(
             overwrite=overwrite,
             resume=resume,
             strict=strict,
+            check=check,
             threads=threads or min(usable_cores(), _MOST_THREADS),
             progress=messages.progress,
             log=messages.log,

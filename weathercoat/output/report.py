@@ -21,6 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from weathercoat import __version__
 from weathercoat.errors import AccessError, CheckError, Note
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
+from weathercoat.output.folder import REPORT, TIMING
+from weathercoat.output.lock import LOCK
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT_VERSION = 1
@@ -160,13 +162,15 @@ def make_report(
     stopped: str,
     solver: Mapping[str, Any],
     snapshots: Sequence[Mapping[str, Any]],
+    files: Mapping[str, str],
 ) -> dict[str, Any]:
     """The content of `run.json`.
 
     config: the resolved values; inputs: SHA-256 by file name, without folders, which differ from machine to
     machine; meshes: the statistics of each mesh by its name; notes: repairs and losses; quality: what
     a quality that was asked for has set, None without one; stopped: why the run ended; solver: what it did
-    in all steps; snapshots: the figures of each. Figures are rounded to 12 digits, the config is not.
+    in all steps; snapshots: the figures of each; files: the `manifest` of all others. Figures are rounded to
+    12 digits, the config is not.
     """
     return {
         "report_version": REPORT_VERSION,
@@ -180,7 +184,19 @@ def make_report(
         "stopped": stopped,
         "solver": _rounded(solver),
         "snapshots": _rounded(snapshots),
+        "files": dict(files),
     }
+
+
+def manifest(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file of a run but its reports, by its path in the folder with slashes, sorted.
+
+    Raises AccessError where one cannot be read.
+    """
+    apart = {folder / name for name in (REPORT, TIMING, LOCK)}
+    files = (path for path in folder.rglob("*") if path.is_file() and path not in apart)
+    digests = {path.relative_to(folder).as_posix(): sha256(path) for path in files}
+    return dict(sorted(digests.items()))
 
 
 def make_timing(simulation: Mapping[str, float], around: Mapping[str, float]) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""An independent check of finished runs; it shares no code with what writes them."""

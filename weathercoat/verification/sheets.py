@@ -1,0 +1,288 @@
+"""The GLB of a snapshot: sound by itself, and the same film and metal as the PLY."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weathercoat.verification.film import Film
+from weathercoat.verification.findings import Ledger
+from weathercoat.verification.glb import Glb, Primitive
+from weathercoat.verification.metal import Metal
+from weathercoat.verification.ply import PlySnapshot
+from weathercoat.verification.precision import DOUBLE, REPORTED, ROUNDINGS, SINGLE
+
+_PARTS = ("film", "substrate")
+_SCALARS = {
+    "film": {"_RUST", "_DIRT", "_SEPARATED", "_ADHESION", "_SEPARATION_AGE"},
+    "substrate": {"_RUST", "_DIRT", "_BARE"},
+}
+_HIGHEST = {"_RUST": 1.0, "_DIRT": 1.0, "_SEPARATED": 1.0, "_BARE": 1.0, "_ADHESION": np.inf}
+
+
+def check_glb(
+    ledger: Ledger,
+    file: str,
+    glb: Glb,
+    *,
+    film_faces: int,
+    metal_faces: int,
+    other_faces: int,
+    is_shell: bool,
+) -> bool:
+    """Whether a GLB is sound and has as many faces as told: of the film, of the metal, and of unpainted
+    parts. `is_shell`: whether the film has a thickness. Returns whether it can be compared with the PLY.
+    """
+    names = tuple(name for name, _ in glb.nodes[:2])
+    if not ledger.expect("glb-nodes", file, names == _PARTS, f"its first nodes are {names}, not {_PARTS}"):
+        return False
+    sound = True
+    for place, (name, primitives) in enumerate(glb.nodes):
+        for primitive in primitives:
+            where = f"{name}, {primitive.material}"
+            sound &= _check_primitive(ledger, file, where, primitive, glb.age)
+            if place < 2:
+                scalars = {key for key in primitive.attributes if key.startswith("_")}
+                sound &= ledger.expect(
+                    "glb-attributes",
+                    file,
+                    scalars == _SCALARS[name] and "COLOR_0" in primitive.attributes,
+                    f"{where} has the attributes {', '.join(sorted(primitive.attributes))}",
+                )
+    film, metal = glb.nodes[0][1], glb.nodes[1][1]
+    materials = [primitive.material for primitive in film]
+    # A shell has a front, a back, and a rim where there are open edges.
+    wanted = [["paint", "primer", "primer"], ["paint", "primer"]] if is_shell else [["paint"]]
+    sound &= ledger.expect(
+        "glb-materials",
+        file,
+        materials in wanted if film_faces else not materials,
+        f"the film is made of {materials}, not of {wanted[0]}",
+    )
+    sound &= ledger.expect(
+        "glb-materials",
+        file,
+        [part.material for part in metal] == ["metal"],
+        "the substrate is not of one metal",
+    )
+    counts = [("film", film[:2], film_faces), ("substrate", metal, metal_faces)]
+    for name, primitives, told in counts:
+        for primitive in primitives:
+            sound &= ledger.expect(
+                "glb-counts",
+                file,
+                len(primitive.indices) == told,
+                f"{name}, {primitive.material}, has {len(primitive.indices):,} faces instead of {told:,}",
+            )
+    others = sum(len(part.indices) for _, parts in glb.nodes[2:] for part in parts)
+    ledger.expect(
+        "glb-counts",
+        file,
+        others == other_faces,
+        f"unpainted parts have {others:,} faces instead of {other_faces:,}",
+    )
+    return sound
+
+
+def check_agreement(
+    ledger: Ledger,
+    file: str,
+    glb: Glb,
+    snapshot: PlySnapshot,
+    film: Film,
+    metal: Metal,
+    *,
+    up: Sequence[float],
+    thickness: float,
+) -> None:
+    """Whether a sound GLB shows what the PLY of the same step holds.
+
+    up: the model's axis against gravity; thickness: no less than that of the film, in units of the model. The
+    back of the shell lies where the PLY has the film, and the metal where the PLY has it.
+    """
+    ledger.expect(
+        "formats-agree",
+        file,
+        (glb.step, glb.age) == (snapshot.step, snapshot.age),
+        f"tells of step {glb.step}, age {glb.age!r}; the PLY of step {snapshot.step}, age {snapshot.age!r}",
+    )
+    turn = rotation_to_y(up)
+    count = len(metal.vertices)
+    turned = np.einsum("ij,nj->ni", turn, snapshot.positions) - glb.translation
+    extent = float(np.abs(snapshot.positions).max()) + float(np.abs(glb.translation).max())
+    is_exact = all(part == round(part) for part in up)
+    slack = extent * (ROUNDINGS * DOUBLE + (0.0 if is_exact else 4 * REPORTED))
+    every = np.arange(count)
+    rows: dict[str, NDArray[Any]] = {"_RUST": snapshot.rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare}
+    (part,) = glb.nodes[1][1]
+    _compare(ledger, file, "metal", part, metal.faces, every, turned, slack, rows, snapshot.colors)
+
+    rows = {
+        "_RUST": snapshot.rust,
+        "_DIRT": snapshot.dust,
+        "_SEPARATED": snapshot.separated,
+        "_ADHESION": snapshot.adhesion,
+        "_SEPARATION_AGE": snapshot.separation_age,
+    }
+    of_film = np.arange(count, len(snapshot.part))
+    sheets = glb.nodes[0][1]
+    if sheets:
+        lift = 2.0 * thickness if len(sheets) > 1 else 0.0
+        _compare(
+            ledger, file, "paint", sheets[0], film.faces, of_film, turned, slack + lift, rows, snapshot.colors
+        )
+    if len(sheets) > 1:
+        rim = len(sheets[2].indices) if len(sheets) > 2 else 0
+        open_edges = film.faces.size - int(np.count_nonzero(film.is_joined))
+        _compare(ledger, file, "primer", sheets[1], film.faces[:, ::-1], of_film, turned, slack, rows, None)
+        ledger.expect(
+            "formats-agree",
+            file,
+            rim == 2 * open_edges,
+            f"the rim has {rim:,} faces for {open_edges:,} open edges of the PLY",
+        )
+
+
+def rotation_to_y(up: Sequence[float]) -> NDArray[np.float64]:
+    """The rotation (3, 3) that turns `up` to +y the short way, after half a turn about x where it points
+    down: the product of two reflections, that of `up` and that of the middle between `up` and y.
+    """
+    axis = np.asarray(up, np.float64) / np.linalg.norm(up)
+    half_turn = np.diag([1.0, -1.0, -1.0]) if axis[1] < 0.0 else np.eye(3)
+    axis = half_turn @ axis
+    middle = axis + np.array([0.0, 1.0, 0.0])
+    return np.asarray(_mirror(middle) @ _mirror(axis) @ half_turn)
+
+
+def _mirror(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The reflection (3, 3) that reverses an axis."""
+    return np.eye(3) - 2.0 * np.outer(axis, axis) / (axis @ axis)
+
+
+def _check_primitive(ledger: Ledger, file: str, where: str, primitive: Primitive, age: float) -> bool:
+    """Whether indices, numbers and bounds of a primitive are in order."""
+    count = len(primitive.attributes["POSITION"])
+    highest = int(primitive.indices.max(initial=0))
+    sound = ledger.expect(
+        "glb-indices",
+        file,
+        highest < count,
+        lambda: (
+            f"{where}: face {np.flatnonzero((primitive.indices >= count).any(axis=1))[0]}"
+            f" has index {highest}, but there are {count:,} vertices"
+        ),
+    )
+    for name, values in primitive.attributes.items():
+        sound &= ledger.expect_all(
+            "glb-finite",
+            file,
+            np.isfinite(values).reshape(count, -1).all(axis=1),
+            _tell(f"{where}: {name} of vertex", "is not finite"),
+        )
+    if not sound:
+        return False
+    positions = primitive.attributes["POSITION"]
+    bounds = np.stack([positions.min(axis=0), positions.max(axis=0)])
+    ledger.expect(
+        "glb-bounds",
+        file,
+        bool((bounds == primitive.bounds).all()),
+        lambda: f"{where}: positions lie within {bounds.tolist()}, not {primitive.bounds.tolist()}",
+    )
+    normals = primitive.attributes.get("NORMAL", np.zeros((count, 3), np.float32)).astype(np.float64)
+    squared = np.einsum("ij,ij->i", normals, normals)
+    # They have been rounded to 32 bits twice, before and after they were turned.
+    ledger.expect_all(
+        "glb-normals",
+        file,
+        np.abs(squared - 1.0) <= 8 * SINGLE,
+        lambda i: f"{where}: the normal of vertex {i} has the length {np.sqrt(squared[i]):.9g}",
+    )
+    limits = {**_HIGHEST, "_SEPARATION_AGE": age * (1.0 + SINGLE), "COLOR_0": 1.0}
+    for name, values in primitive.attributes.items():
+        if name in limits:
+            low, high = float(values.min()), float(values.max())
+            ledger.expect(
+                "glb-ranges",
+                file,
+                low >= 0.0 and high <= limits[name],
+                f"{where}: {name} runs from {low:.9g} to {high:.9g}, not within 0 and {limits[name]:.9g}",
+            )
+    return True
+
+
+def _compare(
+    ledger: Ledger,
+    file: str,
+    what: str,
+    primitive: Primitive,
+    faces: NDArray[np.integer],
+    numbers: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    slack: float,
+    rows: dict[str, NDArray[Any]],
+    colors: NDArray[np.uint8] | None,
+) -> None:
+    """Hold a primitive against the PLY, face by face: faces (m, 3) in the vertices `numbers` of the PLY."""
+    if not ledger.expect(
+        "formats-agree",
+        file,
+        len(primitive.indices) == len(faces),
+        f"{what}: there are {len(primitive.indices):,} faces, but {len(faces):,} in the PLY",
+    ):
+        return
+    indices = primitive.indices.ravel()
+    corners = numbers[faces.ravel()]
+    count = len(primitive.attributes["POSITION"])
+    source = np.zeros(count, np.int64)
+    used = np.zeros(count, np.bool_)
+    source[indices] = corners
+    used[indices] = True
+    if not ledger.expect_all(
+        "formats-agree",
+        file,
+        (source[indices] == corners).reshape(-1, 3).all(axis=1),
+        lambda i: f"{what}: face {i} has a vertex that stands for two of the PLY",
+    ):
+        return
+    stored = primitive.attributes["POSITION"].astype(np.float64)
+    off = np.abs(stored - turned[source]) - SINGLE * np.abs(stored)
+    ledger.expect_all(
+        "formats-agree",
+        file,
+        (off <= slack).all(axis=1) | ~used,
+        lambda i: f"{what}: vertex {i} is {off[i].max():.3g} off vertex {source[i]} of the PLY",
+    )
+    for name, values in rows.items():
+        ledger.expect_all(
+            "formats-agree",
+            file,
+            (primitive.attributes[name] == values[source]) | ~used,
+            _tell(f"{what}: {name} of vertex", "is not that of the PLY"),
+        )
+    if colors is not None:
+        shade, byte = primitive.attributes["COLOR_0"], colors[source]
+        ledger.expect_all(
+            "formats-agree",
+            file,
+            ((shade >= _DARKEST[byte]) & (shade <= _BRIGHTEST[byte])).all(axis=1) | ~used,
+            lambda i: f"{what}: the colour of vertex {i} is not that of vertex {source[i]} of the PLY",
+        )
+
+
+def _tell(subject: str, what: str) -> Callable[[int], str]:
+    """A message about one of many."""
+    return lambda i: f"{subject} {i} {what}"
+
+
+def _linear(value: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear values of sRGB values 0 to 1 (IEC 61966-2-1)."""
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+# Between which linear values an sRGB colour lies that was rounded to a byte, with room for 32 bits.
+_DARKEST = _linear(np.clip((np.arange(256) - 0.5) / 255.0, 0.0, 1.0)) * (1.0 - 2 * SINGLE)
+_BRIGHTEST = _linear(np.clip((np.arange(256) + 0.5) / 255.0, 0.0, 1.0)) * (1.0 + 2 * SINGLE)
