@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 import weathercoat
+from weathercoat.config.load import load_config
 from weathercoat.errors import AccessError, OutputError
 from weathercoat.mesh.shapes import make_box
+from weathercoat.run import run_asset
 
 
 def test_read_remesh_simulate_write(tmp_path: Path) -> None:
@@ -23,6 +25,17 @@ def test_read_remesh_simulate_write(tmp_path: Path) -> None:
     for name in ("aged.ply", "aged.glb", "aged.png"):
         weathercoat.write(tmp_path / name, snapshot)
         assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_verify(tmp_path: Path) -> None:
+    weathercoat.write(tmp_path / "box.obj", make_box())
+    run_asset(
+        load_config("standard", ["ageing.steps=1", "remesh=off"]), tmp_path / "box.obj", tmp_path / "box"
+    )
+    assert weathercoat.verify(tmp_path / "box").is_whole
+    (tmp_path / "box" / "preview.png").unlink()
+    (finding,) = weathercoat.verify(tmp_path / "box").findings
+    assert (finding.check, finding.file) == ("files-there", "preview.png")
 
 
 def test_errors_are_the_package_s_own(tmp_path: Path) -> None:

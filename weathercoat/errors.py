@@ -213,7 +213,7 @@ class LimitError(WeathercoatError):
 
 
 class CheckError(WeathercoatError):
-    """The tool's own result failed its checks; nothing was written."""
+    """A result fails its checks: the tool's own, and then nothing was written, or a run given to `verify`."""
 
     code = "E-CHECK"
     exit_code = 6

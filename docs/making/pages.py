@@ -55,8 +55,8 @@ $ weathercoat run rusting barrel.obj -o barrel --set 'snapshots.steps=[0, 200, 4
 _ABOUT_PYTHON = """\
 # In Python
 
-This page is made by `make docs` from the docstrings of `weathercoat.api`. Four functions, each a step of what
-`weathercoat run` does:
+This page is made by `make docs` from the docstrings of `weathercoat.api`. Five functions: each step of what
+`weathercoat run` does, and the check of a finished run:
 
 ```python
 import weathercoat
@@ -81,7 +81,7 @@ _EXIT_CODES = {
     3: "the model cannot be read",
     4: "the model holds no usable surface, or needed a repair under `--strict`",
     5: "over a limit of size, faces or memory",
-    6: "the tool's own result failed its checks; nothing was written",
+    6: "a result fails its checks: the tool's own, and nothing was written, or a run given to `verify`",
     7: "the output cannot be written, or exists",
     8: "reserved for batches: some assets failed, the others are kept",
     70: "internal error: please report it",

@@ -63,7 +63,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["--help"]) == 0
     out = capsys.readouterr().out
     commands = out.partition("Commands:")[2]
-    for name in ("run", "plan", "config", "sample", "inspect", "remesh", "render", "warmup", "bench"):
+    for name in ("run", "plan", "config", "sample", "inspect", "remesh", "render", "verify", "warmup"):
         assert f"  {name} " in commands
 
 

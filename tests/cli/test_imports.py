@@ -30,6 +30,7 @@ print("LOADED", code, *loaded)
         ["remesh", "--help"],
         ["inspect", "--help"],
         ["render", "--help"],
+        ["verify", "--help"],
         ["bench", "--help"],
         ["bench", "speed", "--help"],
         ["warmup", "--help"],

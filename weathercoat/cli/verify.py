@@ -32,7 +32,9 @@ def command(folders: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
 
     found = [verify_run(folder) for folder in folders]
     if as_json:
-        click.echo(json.dumps([_as_dict(run) for run in found], indent=2, ensure_ascii=False))
+        whole = all(run.is_whole for run in found)
+        content = {"whole": whole, "runs": [_as_dict(run) for run in found]}
+        click.echo(json.dumps(content, indent=2, ensure_ascii=False))
     elif not quiet:
         for run in found:
             click.echo("\n".join(_lines(run, f"{run.folder}: " if len(found) > 1 else "")))
