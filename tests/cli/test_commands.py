@@ -63,7 +63,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["--help"]) == 0
     out = capsys.readouterr().out
     commands = out.partition("Commands:")[2]
-    for name in ("run", "plan", "config", "sample", "inspect", "remesh", "render", "verify", "warmup"):
+    for name in ("run", "plan", "config", "sample", "inspect", "remesh", "render", "verify", "bench"):
         assert f"  {name} " in commands
 
 
@@ -392,6 +392,7 @@ def test_completion_scripts_call_back(shell: str, capsys: pytest.CaptureFixture[
                 "warmup",
                 "bench",
                 "completion",
+                "verify",
             },
         ),
         ("weathercoat run cr", {"crackle"}),

@@ -15,7 +15,7 @@ from weathercoat.mesh.surface import make_surface
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run with cracks and lost film, in both formats, with a picture and an unpainted part."""
+    """The folder of a run that lost film, in both formats, with a picture and an unpainted part."""
     pipe = make_pipe()
     count, others = len(pipe.vertices), np.array([(3.0, 0.0, 0.0), (4.0, 0.0, 0.0), (3.0, 1.0, 0.0)])
     surface = make_surface(
