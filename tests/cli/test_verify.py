@@ -45,7 +45,7 @@ def test_a_whole_run_ends_with_0(run: Path, capsys: pytest.CaptureFixture[str]) 
     assert call(["verify", "run"]) == 0
     open_question, closing = capsys.readouterr().out.splitlines()
     assert open_question == "not proved: that PLY and GLB agree: the run wrote no GLB"
-    assert re.fullmatch(r"whole: \d files, 2 snapshots, \d{3} checks", closing)
+    assert re.fullmatch(r"whole: \d files, 2 snapshots, \d+ checks", closing)
     assert call(["verify", "run", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
@@ -62,8 +62,8 @@ def test_every_finding_is_a_line_and_the_end_is_6(run: Path, capsys: pytest.Capt
         "run/snapshots/step_0005.ply: is listed in run.json, but missing",
         "run/notes.txt: is not listed in run.json",
     ]
-    assert re.fullmatch(r"run: not whole: \d files, 2 snapshots, \d{3} checks", lines[3])
-    assert re.fullmatch(r"other: whole: \d files, 2 snapshots, \d{3} checks", lines[5])
+    assert re.fullmatch(r"run: not whole: \d files, 2 snapshots, \d+ checks", lines[3])
+    assert re.fullmatch(r"other: whole: \d files, 2 snapshots, \d+ checks", lines[5])
     assert call(["verify", "run", "--quiet"]) == 6
     assert capsys.readouterr() == ("", "weathercoat: run: E-CHECK: 2 findings; run again\n")
 
