@@ -10,7 +10,8 @@ from typing import Any
 
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.quality import AUTO, Point, kept_keys, point_of, read_front, with_point
-from weathercoat.cost import Cost, estimate_cost
+from weathercoat.cost import Cost, estimate_cost, in_megabytes, what_fits
+from weathercoat.memory import MemoryLimit
 from weathercoat.mesh.surface import Surface
 
 SWEEPING = ("sweeps", "momentum")  # the solvers that heed deformation.sweeps
@@ -20,11 +21,12 @@ MOST_IMAGE = 0.5  # difference of pictures, relative to that of two seeds
 
 @dataclass(frozen=True)
 class Plan:
-    """A run to be: its config, in which the quality has set what it sets; its cost; and what `run.json` says
-    of the quality, None where none is asked for.
+    """A run to be: its config, in which the quality has set what it sets; the triangles of its model; its
+    cost; and what `run.json` says of the quality, None where none is asked for.
     """
 
     loaded: LoadedConfig
+    model_faces: int
     cost: Cost
     quality: dict[str, Any] | None
 
@@ -45,7 +47,7 @@ def make_plan(loaded: LoadedConfig, painted: Surface, model_faces: int) -> Plan:
     """
     quality = loaded.config.quality
     if quality is None:
-        return Plan(loaded, estimate_cost(loaded.config, model_faces), None)
+        return Plan(loaded, model_faces, estimate_cost(loaded.config, model_faces), None)
     view = _view_of(loaded, painted)
     if quality == AUTO:
         assert view is not None  # the schema asks for a scene
@@ -67,6 +69,7 @@ def make_plan(loaded: LoadedConfig, painted: Surface, model_faces: int) -> Plan:
         chosen["sweeps"] = config.deformation.sweeps
     return Plan(
         settled,
+        model_faces,
         cost,
         {
             "asked": quality,
@@ -102,7 +105,24 @@ def plan_lines(plan: Plan) -> Iterator[str]:
             yield f"{'an edge is':18} {edge:.2g} pixels long"
         errors = quality["expected"]["errors"]
         yield f"{'expected errors':18} " + (", ".join(_error_words(errors)) if errors else "unknown")
-    yield f"{'expected cost':18} about {plan.cost.seconds:,.0f} s and {plan.cost.memory / 1e6:,.0f} MB"
+    yield f"{'expected cost':18} about {plan.cost.seconds:,.0f} s and {in_megabytes(plan.cost.memory)}"
+
+
+def cost_figures(plan: Plan, limit: MemoryLimit | None) -> dict[str, Any]:
+    """What a run is expected to cost, and whether it keeps within a limit of memory, ready for JSON."""
+    return {
+        "seconds": round(plan.cost.seconds, 1),
+        "memory_mb": round(plan.cost.memory / 1e6),
+        "memory_limit_mb": None if limit is None else round(limit.bytes / 1e6),
+        "fits": limit is None or plan.cost.memory <= limit.bytes,
+    }
+
+
+def refusal_lines(plan: Plan, limit: MemoryLimit | None) -> Iterator[str]:
+    """That a run would be refused, and what would fit; nothing where it would not."""
+    if limit is not None and plan.cost.memory > limit.bytes:
+        yield f"{'too much memory':18} more than {in_megabytes(limit.bytes)}, {limit.origin}"
+        yield f"{'instead':18} {what_fits(plan.loaded.config, plan.model_faces, limit)}"
 
 
 def _view_of(loaded: LoadedConfig, painted: Surface) -> _View | None:

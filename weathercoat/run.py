@@ -15,15 +15,17 @@ import numpy as np
 from weathercoat.compile import Compiling, remove_unused, watch_compiling
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
+from weathercoat.cost import require_memory, require_memory_to_read
 from weathercoat.deform.parameters import DeformParameters
 from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError
 from weathercoat.film.state import FilmParameters
+from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
-from weathercoat.mesh.read import read_stream, read_surface
+from weathercoat.mesh.read import MAX_BYTES, read_stream, read_surface
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
-from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder
+from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder, kept_in
 from weathercoat.output.lock import LOCK
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.report import (
@@ -83,6 +85,7 @@ def run_asset(
     strict: bool = False,
     check: bool = True,
     threads: int = 1,
+    max_memory: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     log: Callable[[str], None] | None = None,
     patience: Patience | None = None,
@@ -94,17 +97,19 @@ def run_asset(
     interrupted run left in `OUT.partial`, or extend the finished run in `out`; begin where there is neither.
     strict: any warning ends the run with StrictError. check: whether the result is verified before the folder
     is put in place; CheckError where it is not whole. threads: how many share a step's work; their number
-    changes no result. progress: called with the steps done and their number. log: called with each warning
-    and with what was done, a line each. patience: entered while steps are made; where it is asked to stop, a
-    checkpoint is written first. Errors: those of reading, of remeshing, of `resume`, and of
-    `output.folder.RunFolder`; one that leaves work to go on from says where in its notes.
+    changes no result. max_memory: bytes; a run that is expected to need more is refused with LimitError, by
+    default one that needs more than this process may use. progress: called with the steps done and their
+    number. log: called with each warning and with what was done, a line each. patience: entered while steps
+    are made; where it is asked to stop, a checkpoint is written first. Errors: those of reading, of
+    remeshing, of `resume`, and of `output.folder.RunFolder`; one that leaves work to go on from says where in
+    its notes.
     """
     say = log or (lambda line: None)
     watch = Stopwatch()
     run_folder = RunFolder(out, overwrite=overwrite, resume=resume)
     with report_compiling(say), note_what_is_kept(run_folder), run_folder as folder:
         with watch.time("read"):
-            intake = _take_in(loaded, model, format, say, strict=strict)
+            intake = _take_in(loaded, model, format, say, memory_limit(max_memory), strict=strict)
         config = intake.plan.loaded.config
         identity = identify(config, intake.inputs)
         checkpoint = None
@@ -167,15 +172,17 @@ def _take_in(
     model: str | Path | BinaryIO,
     format: str | None,
     say: Callable[[str], None],
+    limit: MemoryLimit | None,
     *,
     strict: bool,
 ) -> _Intake:
-    surface, inputs = _read(model, format, loaded.config)
+    surface, inputs = _read(model, format, loaded.config, limit)
     name = next(iter(inputs))
     with name_errors(name):
         report_notes(surface.notes, name, say, strict=strict)
         painted, untouched = split_paint(surface, loaded.config)
         plan = make_plan(loaded, painted, len(surface.faces))
+        require_memory(plan.loaded.config, plan.model_faces, limit)
     if plan.quality is not None:
         say(f"quality {plan.quality['asked']}: {plan.quality['why']}")
     return _Intake(surface, painted, untouched, inputs, plan)
@@ -196,16 +203,19 @@ def note_what_is_kept(run_folder: RunFolder) -> Iterator[None]:
         yield
     except BaseException as error:
         if run_folder.is_kept:
-            error.add_note(f"the work so far is kept in {run_folder.path}")
+            error.add_note(kept_in(run_folder.path))
         raise
 
 
-def _read(model: str | Path | BinaryIO, format: str | None, config: Config) -> tuple[Surface, dict[str, str]]:
+def _read(
+    model: str | Path | BinaryIO, format: str | None, config: Config, limit: MemoryLimit | None
+) -> tuple[Surface, dict[str, str]]:
     """The repaired surface, and the SHA-256 of its file by name."""
     if isinstance(model, (str, Path)):
+        require_memory_to_read(Path(model), limit)
         surface = read_surface(model, format=format, up=config.model.up)
         return surface, {Path(model).name: sha256(Path(model))}
-    content = model.read()
+    content = model.read(MAX_BYTES + 1)  # one too many is refused below
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
 
 

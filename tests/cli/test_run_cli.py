@@ -194,6 +194,17 @@ def test_signals_raise_and_ignored_ones_stay_ignored(restored_signals: None) -> 
         signal.raise_signal(signal.SIGTERM)
 
 
+def test_a_second_signal_does_not_disturb_what_the_first_has_begun(restored_signals: None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signals.raise_signals()
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except Interrupted:
+        signal.raise_signal(signal.SIGINT)
+    else:
+        pytest.fail("the first one did not raise")
+
+
 @pytest.mark.parametrize(("number", "kind"), [(signal.SIGINT, Interrupted), (signal.SIGTERM, Terminated)])
 def test_a_signal_that_is_lost_in_a_callback_comes_again(
     restored_signals: None, number: int, kind: type[Stopped]
@@ -230,6 +241,7 @@ def restored_signals() -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     hook = sys.unraisablehook
     yield
+    signal.set_wakeup_fd(-1)
     sys.unraisablehook = hook
     for number, handler in before.items():
         signal.signal(number, handler)

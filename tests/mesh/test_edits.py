@@ -47,7 +47,9 @@ def flip_plainly(mesh: EditableMesh, normals: Vectors, passes: int, regularity: 
     excess = valence_excess(mesh)
     done = 0
     for _ in range(passes):
-        flips = flip_pass(mesh, normals, excess, regularity, np.ones(3 * int(mesh.count[1]), np.bool_))
+        half_edges = 3 * int(mesh.count[1])
+        is_due = np.ones(half_edges, np.bool_)
+        flips = flip_pass(mesh, normals, excess, regularity, is_due, 0, half_edges)
         if flips == 0:
             break
         done += flips

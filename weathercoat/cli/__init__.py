@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from typing import NoReturn
 
@@ -12,6 +13,9 @@ from weathercoat.cli.signals import Stopped, raise_signals
 def main() -> NoReturn:
     """The entry point: run the command line of this process and exit."""
     raise_signals()
+    # No result depends on BLAS; its threads would reserve memory for every core, and where they get none,
+    # raise SIGINT.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Modules and compiled functions stay to the end. To look through them for garbage again and again, and
     # once more at exit, would take a fifth of the time of a short run.
     gc.set_threshold(100_000, 50, 100)

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from weathercoat.cli import options
+from weathercoat.memory import memory_limit
 
 
 @click.command()
@@ -19,6 +20,7 @@ from weathercoat.cli import options
 )
 @options.assignments
 @options.model_format
+@options.max_memory
 @options.as_json
 @options.debug
 def command(
@@ -27,6 +29,7 @@ def command(
     config: str,
     assignments: tuple[str, ...],
     model_format: str | None,
+    max_memory: int | None,
     as_json: bool,
 ) -> None:
     """Tell the faces, components, boundary and manifoldness of MODEL, its repairs, and the cost of a run."""
@@ -34,19 +37,19 @@ def command(
     from weathercoat.cli.reading import read_model
     from weathercoat.config.load import load_config
     from weathercoat.mesh.inspect import inspect_surface
-    from weathercoat.plan import make_plan
+    from weathercoat.plan import cost_figures, make_plan, refusal_lines
     from weathercoat.run import report_compiling
 
     loaded = load_config(config, assignments)
     with Messages(quiet=as_json) as messages, report_compiling(messages.log):
-        surface = read_model(model, model_format, up=loaded.config.model.up)
+        surface = read_model(model, model_format, up=loaded.config.model.up, max_memory=max_memory)
         found = inspect_surface(surface, self_intersections=self_intersections)
-    cost = make_plan(loaded, surface, len(surface.faces)).cost
-    found["run_cost"] = {"seconds": round(cost.seconds, 1), "memory_mb": round(cost.memory / 1e6)}
+    plan, limit = make_plan(loaded, surface, len(surface.faces)), memory_limit(max_memory)
+    found["run_cost"] = cost_figures(plan, limit)
     if as_json:
         click.echo(json.dumps(found, indent=2, ensure_ascii=False))
     else:
-        click.echo("\n".join(_lines(found)))
+        click.echo("\n".join([*_lines(found), *refusal_lines(plan, limit)]))
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from click.shell_completion import CompletionItem
 from weathercoat.config.presets import preset_names
 from weathercoat.config.quality import AUTO, LEVELS
 from weathercoat.errors import UsageError
+from weathercoat.memory import parse_size
 
 if TYPE_CHECKING:
     from weathercoat.config.load import Override
@@ -68,6 +69,21 @@ threads = click.option(
     type=click.IntRange(min=1),
     metavar="N",
     help="Threads that share the work of a large film; all cores, at most 4, by default. Changes no result.",
+)
+
+
+class _Size(click.ParamType):
+    name = "size"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        return value if isinstance(value, int) else parse_size(value)
+
+
+max_memory = click.option(
+    "--max-memory",
+    type=_Size(),
+    metavar="SIZE",
+    help="Memory that a run may take at its peak, such as 4G; what this process may use, by default.",
 )
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")

@@ -8,6 +8,7 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.errors import UsageError
+from weathercoat.memory import memory_limit
 
 
 @click.command()
@@ -17,6 +18,7 @@ from weathercoat.errors import UsageError
 @options.steps
 @options.faces
 @options.model_format
+@options.max_memory
 @options.as_json
 @options.debug
 def command(
@@ -26,6 +28,7 @@ def command(
     steps: int | None,
     faces: int | None,
     model_format: str | None,
+    max_memory: int | None,
     as_json: bool,
 ) -> None:
     """Tell what a run of MODEL by CONFIG would choose, cost and be wrong by, without running.
@@ -36,7 +39,7 @@ def command(
     from weathercoat.cli.messages import Messages
     from weathercoat.cli.reading import read_model
     from weathercoat.config.load import load_config
-    from weathercoat.plan import make_plan, plan_lines
+    from weathercoat.plan import cost_figures, make_plan, plan_lines, refusal_lines
     from weathercoat.run import name_errors, report_compiling, split_paint
 
     if len(config_and_model) > 2:
@@ -47,15 +50,16 @@ def command(
     shortcuts = options.shortcuts(quality=quality, steps=steps, faces=faces)
     loaded = load_config(configs[0] if configs else "standard", [*assignments, *shortcuts])
     with Messages(quiet=as_json) as messages, report_compiling(messages.log), name_errors(model):
-        surface = read_model(model, model_format, up=loaded.config.model.up)
+        surface = read_model(model, model_format, up=loaded.config.model.up, max_memory=max_memory)
         painted, _ = split_paint(surface, loaded.config)
         plan = make_plan(loaded, painted, len(surface.faces))
+    limit = memory_limit(max_memory)
     if as_json:
         content = {
             "quality": plan.quality,
-            "cost": {"seconds": round(plan.cost.seconds, 1), "memory_mb": round(plan.cost.memory / 1e6)},
+            "cost": cost_figures(plan, limit),
             "config": plan.loaded.config.as_dict(),
         }
         click.echo(json.dumps(content, indent=2, ensure_ascii=False))
     else:
-        click.echo("\n".join(plan_lines(plan)))
+        click.echo("\n".join([*plan_lines(plan), *refusal_lines(plan, limit)]))

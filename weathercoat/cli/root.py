@@ -11,6 +11,7 @@ from importlib import import_module
 import click
 
 from weathercoat import __version__
+from weathercoat.memory import require_address_space
 
 _SUBCOMMANDS = (
     "run",
@@ -50,3 +51,4 @@ def weathercoat() -> None:
     weathercoat sample sign -o sign.obj
     weathercoat run crackle sign.obj -o sign
     """
+    require_address_space()

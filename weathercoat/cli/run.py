@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from weathercoat import unfinished
 from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
@@ -31,6 +32,7 @@ _MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
 @options.faces
 @options.model_format
 @options.threads
+@options.max_memory
 @options.overwrite
 @options.resume
 @options.strict
@@ -50,6 +52,7 @@ def command(
     faces: int | None,
     model_format: str | None,
     threads: int | None,
+    max_memory: int | None,
     overwrite: bool,
     resume: bool,
     strict: bool,
@@ -91,6 +94,7 @@ def command(
             resume=resume,
             strict=strict,
             check=check,
+            max_memory=max_memory,
             threads=threads or min(usable_cores(), _MOST_THREADS),
             progress=messages.progress,
             log=messages.log,
@@ -105,14 +109,22 @@ def command(
 @contextmanager
 def _say_how_to_go_on() -> Iterator[None]:
     """Note the command that goes on where an error leaves work to go on from."""
+    given = [word for word in click.get_current_context().find_root().obj if word != "--overwrite"]
+    again = given if "--resume" in given else [*given[:1], "--resume", *given[1:]]
+    how = f"go on with: {shlex.join(['weathercoat', *again])}"
+
+    def at_sudden_end(told: list[str]) -> str | None:
+        return how if told else None
+
+    unfinished.begin(at_sudden_end)
     try:
         yield
     except BaseException as error:
         if getattr(error, "__notes__", None):
-            given = [word for word in click.get_current_context().find_root().obj if word != "--overwrite"]
-            again = given if "--resume" in given else [*given[:1], "--resume", *given[1:]]
-            error.add_note(f"go on with: {shlex.join(['weathercoat', *again])}")
+            error.add_note(how)
         raise
+    finally:
+        unfinished.end(at_sudden_end)
 
 
 def _table(report: dict[str, Any]) -> Iterator[str]:

@@ -6,13 +6,17 @@ import _thread
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
+
+from weathercoat.cli.watchdog import Watchdog
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
 SECONDS_UNTIL_AGAIN = 0.02
+SECONDS_TO_LEAVE = 2.0
 SECONDS_OF_PATIENCE = 0.5
 
 
@@ -37,16 +41,24 @@ class Terminated(Stopped):
     word, exit_code = "terminated", 143
 
 
-_RAISED = {signal.SIGINT: Interrupted, signal.SIGTERM: Terminated}
+_RAISED: dict[int, type[Stopped]] = {signal.SIGINT: Interrupted, signal.SIGTERM: Terminated}
 _NUMBERS = {kind: number for number, kind in _RAISED.items()}
+_watchdog = Watchdog(_RAISED)
+_leaves_until = 0.0  # by time.monotonic
 
 
 def raise_signals() -> None:
-    """Make SIGINT and SIGTERM raise in the main thread; one that is ignored, as under `nohup`, stays so."""
+    """Make SIGINT and SIGTERM raise in the main thread; one that is ignored, as under `nohup`, stays so.
+
+    Where the main thread does not hear of them in time, the process ends all the same.
+    """
+    global _watchdog, _leaves_until
+    _watchdog, _leaves_until = Watchdog(_RAISED), 0.0
     for number in _RAISED:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _raise)
     sys.unraisablehook = _deliver_again
+    _watchdog.start()
 
 
 class Patience:
@@ -68,7 +80,7 @@ class Patience:
         """Raise the signal that waits."""
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         assert self._asked is not None
-        raise _RAISED[signal.Signals(self._asked)]
+        _leave(self._asked)
 
     def __enter__(self) -> Patience:
         is_main = threading.current_thread() is threading.main_thread()
@@ -87,8 +99,10 @@ class Patience:
         if self._patient:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, self._alarm)
-        if self.is_asked and kind is None:
-            self.stop()
+        if self.is_asked:
+            _watchdog.answer()
+            if kind is None:
+                self.stop()
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         if self.is_asked:  # a second one waits no longer
@@ -101,7 +115,16 @@ class Patience:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    raise _RAISED[signal.Signals(number)]
+    """Raise what stands for a signal, but not within what an earlier one has begun: clearing away."""
+    if time.monotonic() >= _leaves_until:
+        _leave(number)
+
+
+def _leave(number: int) -> NoReturn:
+    global _leaves_until
+    _watchdog.answer()
+    _leaves_until = time.monotonic() + SECONDS_TO_LEAVE
+    raise _RAISED[number]
 
 
 def _deliver_again(ignored: UnraisableHookArgs) -> None:
@@ -112,6 +135,9 @@ def _deliver_again(ignored: UnraisableHookArgs) -> None:
     if number is None:
         sys.__unraisablehook__(ignored)
         return
+    global _leaves_until
+    _leaves_until = 0.0
+    _watchdog.expect_again()
     again = threading.Timer(SECONDS_UNTIL_AGAIN, _thread.interrupt_main, [number])
     again.daemon = True
     again.start()

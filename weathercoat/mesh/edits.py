@@ -14,6 +14,7 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.connectivity import FREE, EditableMesh, collapse_edge, flip_edge, split_edge
 from weathercoat.mesh.creases import Features, place_on_chain
 from weathercoat.mesh.halfedge import next_of, prev_of
+from weathercoat.mesh.slices import AT_ONCE, in_slices
 from weathercoat.mesh.surface import Indices, Vectors
 
 _LEAST_COSINE = 0.3  # by more than this angle no edit may turn a face
@@ -386,9 +387,16 @@ def valence_excess(mesh: EditableMesh) -> Indices:
 
 @kernel
 def flip_pass(
-    mesh: EditableMesh, normals: Vectors, excess: Indices, regularity: float, is_due: NDArray[np.bool_]
+    mesh: EditableMesh,
+    normals: Vectors,
+    excess: Indices,
+    regularity: float,
+    is_due: NDArray[np.bool_],
+    first: int,
+    last: int,
 ) -> int:
-    """Flip inner edges that are not Delaunay or whose flip makes valences regular; returns how many.
+    """Flip inner edges that are not Delaunay or whose flip makes valences regular, of the half-edges from
+    `first` to before `last`; returns how many.
 
     An edge is flipped where cot α + cot β of the opposite angles is below `regularity` times half the
     decrease of the sum of squares of `excess`, which is brought up to date. Only edges whose half-edge is
@@ -396,7 +404,7 @@ def flip_pass(
     """
     p, tail, twin, crease, chain = mesh.position, mesh.tail, mesh.twin, mesh.crease, mesh.chain
     done = 0
-    for h in range(3 * mesh.count[1]):
+    for h in range(first, last):
         if not is_due[h]:
             continue
         is_due[h] = False
@@ -464,8 +472,12 @@ def flip_edges(
     """Flip until nothing changes, or for that many passes, as `flip_pass` does; all edges are due if none are
     named."""
     excess = valence_excess(mesh)
+    half_edges = 3 * int(mesh.count[1])
     if is_due is None:
-        is_due = np.ones(3 * int(mesh.count[1]), np.bool_)
+        is_due = np.ones(half_edges, np.bool_)
     for _ in range(passes):
-        if flip_pass(mesh, normals, excess, regularity, is_due) == 0:
+        done = 0
+        for part in in_slices(half_edges, 10 * AT_ONCE):
+            done += flip_pass(mesh, normals, excess, regularity, is_due, part.start, part.stop)
+        if done == 0:
             return

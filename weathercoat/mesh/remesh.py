@@ -47,6 +47,7 @@ from weathercoat.mesh.mending import DEGENERATE, find_bad_faces, mend_pass, rele
 from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.orientation import balance_directions, find_flat_parts
 from weathercoat.mesh.projection import InputSurface, barycentric_of
+from weathercoat.mesh.slices import in_slices
 from weathercoat.mesh.smoothing import apply_moves, fan_normals, smooth
 from weathercoat.mesh.surface import Indices, Place, Surface, Vectors, face_areas
 
@@ -277,7 +278,7 @@ def _split(
     chosen = random.permutation(np.flatnonzero(length > limit).astype(np.int32))
     ratios = random.uniform(0.3, 0.7, len(chosen))
     mesh = reserve(mesh, len(chosen))
-    split_pass(chosen, ratios, inner, along, mesh, features)
+    _split_all(chosen, ratios, inner, along, mesh, features)
     return mesh
 
 
@@ -289,8 +290,22 @@ def _collapse(
     chosen = random.permutation(
         np.flatnonzero((lengths >= 0) & (lengths < _COLLAPSE * length)).astype(np.int32)
     )
-    collapse_pass(chosen, _COLLAPSE * length, _SPLIT * length, mesh, features, source.normals)
+    _collapse_all(chosen, _COLLAPSE * length, _SPLIT * length, mesh, features, source.normals)
     return compact(mesh)
+
+
+def _split_all(
+    chosen: Indices, ratios: Vectors, inner: float, along: float, mesh: EditableMesh, features: Features
+) -> None:
+    for part in in_slices(len(chosen)):
+        split_pass(chosen[part], ratios[part], inner, along, mesh, features)
+
+
+def _collapse_all(
+    chosen: Indices, limit: float, longest: float, mesh: EditableMesh, features: Features, normals: Vectors
+) -> None:
+    for part in in_slices(len(chosen)):
+        collapse_pass(chosen[part], limit, longest, mesh, features, normals)
 
 
 def _meet_count(
@@ -310,12 +325,12 @@ def _meet_count(
         by_length = inner[np.argsort(lengths[inner], kind="stable")]
         if surplus > 0:
             chosen = by_length[:surplus]
-            collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
+            _collapse_all(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
             mesh = compact(mesh)
         elif surplus < 0:
             chosen = by_length[surplus:]
             mesh = reserve(mesh, len(chosen))
-            split_pass(chosen, np.full(len(chosen), 0.5), 0.0, 0.0, mesh, features)
+            _split_all(chosen, np.full(len(chosen), 0.5), 0.0, 0.0, mesh, features)
         for _ in range(2):
             flip_edges(mesh, source.normals, 5, _REGULARITY)
             _relax(mesh, features, source, edge_length)
@@ -334,7 +349,7 @@ def _remove_poor_faces(
     half_edges = np.maximum(half_edges, mesh.twin[half_edges])
     shortest = half_edges[np.arange(len(poor)), np.argmin(lengths[half_edges], axis=1)]
     chosen = np.unique(shortest).astype(np.int32)
-    collapse_pass(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
+    _collapse_all(chosen, np.inf, _LONGEST * length, mesh, features, source.normals)
     return compact(mesh)
 
 

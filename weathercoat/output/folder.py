@@ -26,6 +26,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
+from weathercoat import unfinished
 from weathercoat.errors import (
     AccessError,
     CheckError,
@@ -94,6 +95,7 @@ class RunFolder:
             with contextlib.suppress(OSError):
                 self.path.rmdir()  # only if it is empty
             raise
+        unfinished.begin(self._give_up)
         return self.path
 
     def __exit__(
@@ -110,6 +112,14 @@ class RunFolder:
             if self.path.is_dir() and not self.is_kept:
                 shutil.rmtree(self.path, ignore_errors=True)
             self._lock.release(remove=not self.is_kept)
+            unfinished.end(self._give_up)
+
+    def _give_up(self, told: list[str]) -> str | None:
+        """Clear away as `__exit__` does after a signal, at a moment when that does not come."""
+        if (self.path / CHECKPOINT_STATE).is_file():
+            return kept_in(self.path)
+        shutil.rmtree(self.path, ignore_errors=True)
+        return None
 
     def abandon(self) -> None:
         """Let the end of the block leave the target as it is."""
@@ -180,6 +190,11 @@ class RunFolder:
         shutil.rmtree(old, ignore_errors=True)
 
 
+def kept_in(path: Path) -> str:
+    """What to tell of a working folder that holds a checkpoint."""
+    return f"the work so far is kept in {path}"
+
+
 @contextlib.contextmanager
 def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[BinaryIO]:
     """A binary stream that becomes the file `target` when the block ends without an error.
@@ -199,6 +214,11 @@ def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[Binar
             "the file exists", file=str(path), remedy="choose another, or give --overwrite"
         )
     aside = _aside(path)
+
+    def give_up(told: list[str]) -> None:
+        aside.unlink(missing_ok=True)
+
+    unfinished.begin(give_up)
     try:
         with _output_errors(path):
             with aside.open("xb") as stream:
@@ -206,6 +226,7 @@ def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[Binar
             aside.replace(path)
     finally:
         aside.unlink(missing_ok=True)
+        unfinished.end(give_up)
 
 
 def safe_name(text: str, suffix: str = "") -> str:

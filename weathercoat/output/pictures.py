@@ -80,6 +80,7 @@ class PictureParameters:
 
 _KEY = 2.75 * np.array([1.0, 0.95, 0.87])
 _SAME_SURFACE = 0.004  # distance from a plane, in sizes, within which samples count as one surface
+_RAYS_AT_ONCE = 100_000  # a fraction of a second, so that Ctrl-C is answered
 _STAIN_DEPTH = np.array([0.35, 1.1, 2.2])  # a stain takes away blue first
 
 
@@ -174,7 +175,7 @@ def _first_hits(
     weights = np.empty((height, width, 2), np.float32)
     rows, columns = camera.window(mesh.vertices, width, height)
     across = np.arange(columns.start, columns.stop)
-    band = max(1, 500_000 // max(1, len(across)))
+    band = max(1, _RAYS_AT_ONCE // max(1, len(across)))
     for first in range(rows.start, rows.stop, band):
         down = np.arange(first, min(first + band, rows.stop))
         directions = camera.directions(down, across, width, height)
