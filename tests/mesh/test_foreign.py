@@ -17,8 +17,8 @@ VTK = next(seed.data.decode() for seed in foreign_seeds() if seed.extension == "
 XDMF = (
     '<?xml version="1.0"?><Xdmf Version="3.0"><Domain><Grid Name="g"><Geometry GeometryType="XYZ">'
     '<DataItem DataType="Float" Dimensions="3 3" Format="{format}" Precision="8">{points}</DataItem>'
-    '</Geometry><Topology TopologyType="Triangle" NumberOfElements="1"><DataItem DataType="Int" Dimensions="1 3" '
-    'Format="XML" Precision="8">0 1 2</DataItem></Topology></Grid></Domain></Xdmf>'
+    '</Geometry><Topology TopologyType="Triangle" NumberOfElements="1"><DataItem DataType="Int" '
+    'Dimensions="1 3" Format="XML" Precision="8">0 1 2</DataItem></Topology></Grid></Domain></Xdmf>'
 )
 
 

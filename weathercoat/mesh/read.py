@@ -109,7 +109,8 @@ def _make_surface(
 
         data, name = unpack_model(data, MAX_BYTES)
         path = None
-        kind, notes = _kind(data, name, None)
+        kind, more = _kind(data, name, None)
+        notes += more
         if kind == "zip":
             raise FormatError("a zip archive within a zip archive", remedy="unpack it first")
     axis = up or _AXES[UP_OF_FORMAT.get(kind, _UP_OF_OTHERS)]

@@ -39,6 +39,8 @@ def _unpack(archive: zipfile.ZipFile, max_bytes: int) -> tuple[bytes, str]:
         entry
         for entry in archive.infolist()
         if PurePosixPath(entry.filename).suffix.lower().removeprefix(".") in known
+        # macOS puts the attributes of each file beside it, under its name.
+        and not entry.filename.startswith("__MACOSX/")
     ]
     if len(models) != 1:
         raise FormatError(f"a zip archive with {len(models)} models; one is expected")

@@ -32,6 +32,8 @@ _STRANGERS = (
     (re.compile(rb"BLENDER"), "a Blender file"),
     (re.compile(rb"ISO-10303-21"), "STEP"),
     (re.compile(rb"#USDA|PXR-USDC"), "USD"),
+    (re.compile(rb"PK\x03\x04.*3D/3dmodel\.model", re.DOTALL), "3MF"),
+    (re.compile(rb"PK\x03\x04.{26}[^\0]*\.usd[ac]?", re.DOTALL), "USD"),
     (re.compile(rb"\x7fELF|MZ"), "a program"),
     (re.compile(rb"(?s)\s*<\?xml.{0,400}<COLLADA"), "COLLADA"),
 )
