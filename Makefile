@@ -12,11 +12,12 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all fuzz lint docs bench charts venv dev clean
+.PHONY: help demo test test-all test-plain test-bounds coverage fuzz lint docs bench charts venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
 	@echo "make test      run the tests (make test-all: the long ones too)"
+	@echo "make coverage  run the core's tests without the JIT, and say what they reach"
 	@echo "make fuzz      read damaged files and configs for FUZZ_SECONDS=1200, from FUZZ_SEED (the date by default)"
 	@echo "make lint      style, types and import contracts"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
@@ -49,8 +50,26 @@ demo: venv
 test: dev
 	$(BIN)/python -m pytest --numprocesses auto
 
-test-all: dev
+test-all: dev test-plain test-bounds
 	$(BIN)/python -m pytest --numprocesses auto -m "long or not long"
+
+# Kernels as plain Python with checked indices, measured; kernels that are compiled with checks. See docs/testing.md.
+CORE_TESTS := tests/film tests/deform tests/stain tests/mesh tests/sim tests/test_checked.py
+PLAIN_TESTS := tests/film tests/deform tests/stain $(addprefix tests/mesh/test_,$(addsuffix .py, \
+	buckets closest dihedral edits frame halfedge order pairing surface weld)) \
+	$(addprefix tests/sim/test_,recorders.py small_runs.py) tests/test_checked.py
+
+test-plain: dev
+	$(BIN)/coverage erase
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest --numprocesses auto -W error::RuntimeWarning $(PLAIN_TESTS)
+	$(BIN)/coverage combine --quiet
+
+test-bounds: dev
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --numprocesses auto $(CORE_TESTS)
+
+coverage: test-plain
+	$(BIN)/coverage report --include "weathercoat/mesh/*,weathercoat/sim/*" --fail-under 0
+	$(BIN)/coverage report
 
 # Another seed each day, so that nightly runs see other files; a failing case is written out with its seed.
 FUZZ_SECONDS ?= 1200
@@ -87,4 +106,4 @@ charts: .venv/bench-$(FINGERPRINT)
 	done
 
 clean:
-	rm -rf .venv $(DEMO) build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv $(DEMO) build .coverage* .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -7,6 +7,20 @@ from pathlib import Path
 
 import pytest
 
+from tests.checked import COMPILED, checked_kernel
+from weathercoat import compile as compiling
+
+if not COMPILED:
+    # before any other module of the package declares its kernels
+    compiling.kernel = checked_kernel
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave out, without the JIT, what is marked as needing it."""
+    for item in items:
+        if not COMPILED and item.get_closest_marker("compiled"):
+            item.add_marker(pytest.mark.skip(reason="takes too long without the JIT"))
+
 
 @pytest.fixture(scope="session")
 def meshes_folder() -> Path:

@@ -22,8 +22,24 @@ from weathercoat.film.noise import perlin, PERMUTATION
 with watch_compiling(lambda: None) as compiling:
     print(perlin(3.14, 42.0, 7.0, PERMUTATION), compiling.kernels)
 """
+# the memory behind the slice is there, so that reading it does no harm
+BEYOND = """
+import numpy
+from weathercoat.compile import kernel
+
+@kernel
+def read(array, index):
+    return array[index]
+
+try:
+    print(read(numpy.zeros(8, numpy.int64)[:4], 6))
+except IndexError as problem:
+    print(type(problem).__name__)
+"""
 SOURCES = Path(weathercoat.__file__).parent
 DAY = 86_400.0
+
+pytestmark = pytest.mark.compiled
 
 
 def environment(**changes: object) -> dict[str, str]:
@@ -77,6 +93,24 @@ def test_a_change_of_an_imported_source_is_noticed(tmp_path: Path) -> None:
     with (site / "weathercoat" / "compile.py").open("a") as stream:
         stream.write("# changed\n")
     assert try_kernel(tmp_path, **places) > 1
+
+
+def test_kernels_that_check_their_indices_are_kept_apart(tmp_path: Path) -> None:
+    """Otherwise a run with checks would take those without from the cache."""
+    for checks in ("0", "1"):
+        assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path, NUMBA_BOUNDSCHECK=checks) > 1
+        assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path, NUMBA_BOUNDSCHECK=checks) == 0
+    (tmp_path / "beyond.py").write_text(BEYOND)
+    for checks, outcome in (("0", "0"), ("1", "IndexError")):
+        done = subprocess.run(
+            [sys.executable, "beyond.py"],
+            env=environment(NUMBA_CACHE_DIR=tmp_path, NUMBA_BOUNDSCHECK=checks),
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.strip() == outcome
 
 
 @pytest.mark.parametrize("place", ["file", "no home"])

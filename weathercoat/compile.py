@@ -2,9 +2,10 @@
 
 Numba's own disk cache does not notice changes in functions that a kernel calls from another file, and two
 processes that compile at once can overwrite each other's entries. So each kernel is a file of its own, named
-by a hash of what it was made from (its signature, the processor, the versions of Python and Numba), in a
-folder named by a hash of the sources that its module is made from: its own and those of all modules of the
-package that it imports, directly or not. A file appears whole; who writes it last changes nothing.
+by a hash of what it was made from (its signature, the processor, the versions of Python and Numba, and
+whether it checks its indices), in a folder named by a hash of the sources that its module is made from: its
+own and those of all modules of the package that it imports, directly or not. A file appears whole; who writes
+it last changes nothing.
 
 The folders lie in the user's cache directory, so that a package which is installed read-only caches as well;
 `NUMBA_CACHE_DIR` names another place.
@@ -104,7 +105,8 @@ class _KernelCache(NullCache):  # type: ignore[misc]
 
     def _path(self, signature: object, codegen: Any) -> Path | None:
         folder = kernel_folder(self._module)
-        made_from = (signature, codegen.magic_tuple(), numba.__version__, sys.version)
+        checks = numba.config.BOUNDSCHECK  # type: ignore[attr-defined]
+        made_from = (signature, codegen.magic_tuple(), numba.__version__, sys.version, checks)
         digest = hashlib.sha256(repr(made_from).encode()).hexdigest()[:16]
         return folder and folder / f"{self._function.__name__}-{digest}.kernel"
 
@@ -204,8 +206,11 @@ def _template_of_wide(template_of: Callable[..., Any], args: tuple[Any, ...], kw
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` at its first call; cached where it can be, IEEE, no check for zero divisors.
 
-    It runs without the interpreter's lock, so that threads can share work.
+    It runs without the interpreter's lock, so that threads can share work. With `NUMBA_DISABLE_JIT` it stays
+    plain Python, whose results are the same (see docs/testing.md).
     """
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
     compiled = numba.njit(  # type: ignore[call-overload]
         fastmath=False, error_model="numpy", nogil=True, no_cfunc_wrapper=True
     )(function)

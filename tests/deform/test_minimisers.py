@@ -183,6 +183,7 @@ def test_faces_of_no_extent_do_no_harm(solver: str) -> None:
 # --- whole runs ---
 
 
+@pytest.mark.compiled
 @SOLVERS
 @pytest.mark.parametrize("surface", [SHEET, make_sphere(320)], ids=["sheet", "ball"])
 def test_invariants_hold_in_a_run(solver: str, surface: object) -> None:
@@ -197,6 +198,7 @@ def test_invariants_hold_in_a_run(solver: str, surface: object) -> None:
     assert simulation.residual().strain_max < 0.1
 
 
+@pytest.mark.compiled
 def test_a_converged_run_is_nearer_to_balance() -> None:
     ends = {}
     for solver in ("sweeps", "newton"):
@@ -209,6 +211,7 @@ def test_a_converged_run_is_nearer_to_balance() -> None:
     assert ends["newton"].energy < ends["sweeps"].energy
 
 
+@pytest.mark.compiled
 @SOLVERS
 def test_the_same_bytes_again(solver: str) -> None:
     """Whatever has run before in the process."""

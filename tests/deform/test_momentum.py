@@ -114,6 +114,7 @@ class PlainMomentum:
         self.run = {v: run[island[v]] for v in movers}
 
 
+@pytest.mark.compiled
 @settings(max_examples=8, deadline=None)
 @given(
     seed=st.integers(0, 10_000), form=st.sampled_from(["dihedral", "split", "arccos"]), share=st.booleans()
@@ -144,6 +145,7 @@ def test_it_is_the_plain_momentum_bit_for_bit(seed: int, form: str, share: bool)
     assert plain.restarts > 0 or form == "arccos", "nothing was turned back"
 
 
+@pytest.mark.compiled
 def test_threads_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sheet of three tiles, with the threshold below which one thread works alone taken away."""
     monkeypatch.setattr(deformation, "_WORTH_SHARING", 0)
@@ -213,6 +215,7 @@ def residual_after(sheet: Sheet, solver: str, sweeps: int, momentum: Momentum | 
     return measure_residual(sheet.mesh, sheet.constraints, parameters(solver, sweeps), 0.0)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(("edges", "sweeps"), [(4, 45), (6, 65), (8, 130), (12, 450), (24, 1800)])
 def test_flaps_come_within_a_tenth(edges: int, sweeps: int) -> None:
     """A quarter more sweeps than are needed for the RMS error of the angles to be a tenth of their RMS; plain
@@ -223,6 +226,7 @@ def test_flaps_come_within_a_tenth(edges: int, sweeps: int) -> None:
     assert residual_after(plain, "sweeps", sweeps).angle_rms > 0.2 * flap.target_rms
 
 
+@pytest.mark.compiled
 def test_the_exact_answer_is_reached() -> None:
     """All targets are met where that is possible: those of the lengths of the rolled strip, too."""
     flap = make_flap(8)
@@ -232,6 +236,7 @@ def test_the_exact_answer_is_reached() -> None:
     assert residual_after(again, "sweeps", 500).angle_rms > 0.2 * flap.target_rms
 
 
+@pytest.mark.compiled
 def test_momentum_lives_on_from_step_to_step() -> None:
     """Hundred steps of five sweeps are not far from one of five hundred, and begun anew in each they are."""
     kept, lost, at_once = make_flap(12), make_flap(12), make_flap(12)
@@ -243,6 +248,7 @@ def test_momentum_lives_on_from_step_to_step() -> None:
     assert anew.angle_rms > 5 * carried.angle_rms
 
 
+@pytest.mark.compiled
 def test_contradicting_targets_end_where_plain_sweeps_end() -> None:
     """A curvature of the same size in all directions. Both come to rest with the same errors, to 3 %, with
     momentum in a tenth of the sweeps.

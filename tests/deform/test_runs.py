@@ -153,6 +153,7 @@ def step_beside(simulation: Simulation) -> None:
         simulation.step()
 
 
+@pytest.mark.compiled
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000), form=st.sampled_from(["dihedral", "split", "arccos"]))
 def test_packed_sweeps_are_the_plain_ones_bit_for_bit(seed: int, form: str) -> None:
@@ -164,6 +165,7 @@ def test_packed_sweeps_are_the_plain_ones_bit_for_bit(seed: int, form: str) -> N
     assert simulation.mesh.vertex_count > len(simulation.mesh.rest_positions), "nothing has split"
 
 
+@pytest.mark.compiled
 def test_a_film_of_many_tiles_is_swept_as_plainly() -> None:
     """More tiles than stay in a cache, whose positions are read ahead."""
     from weathercoat.mesh.order import order_surface

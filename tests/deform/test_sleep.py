@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.deform.test_runs import step_beside
 from tests.sim.runs import assert_invariants, make_run
@@ -10,6 +11,8 @@ from weathercoat.deform.constraints import follow_events
 from weathercoat.mesh.halfedge import cut_edge, make_event_log
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.sim.simulation import Simulation
+
+pytestmark = pytest.mark.compiled
 
 WHOLE = {"cohesion_base": 1e3, "defects_share": 0.0, "flaking_rule": "faces"}  # nothing breaks or falls
 QUICK = {"curl_rate": 20.0, "curl_radius": 1.0, "deformation_sweeps": 10}

@@ -277,6 +277,7 @@ def test_a_clamped_strip_curls_to_a_prism() -> None:
     np.testing.assert_allclose(mesh.positions[:10], expected, atol=1e-9)
 
 
+@pytest.mark.compiled
 def test_a_clamped_sheet_curls_to_a_cylinder() -> None:
     """Targets of an oblique lattice on a cylinder of radius 2: lengths and signed bends, some of them ridges.
 

@@ -39,6 +39,7 @@ def test_a_share_that_fails_is_told_and_the_team_goes_on(culprit: int) -> None:
     assert sorted(done) == [0, 1, 2]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("form", ["dihedral", "split"])
 def test_threads_change_no_bit(monkeypatch: pytest.MonkeyPatch, form: str) -> None:
     """A sheet of three tiles, with the threshold below which one thread works alone taken away."""

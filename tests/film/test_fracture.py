@@ -554,6 +554,7 @@ def test_only_a_crack_that_comes_straight_feels_the_tension_along_another() -> N
         assert film.fracture() == expected
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("scatter", [0.0, 0.2])
 def test_last_bits_do_not_decide_what_breaks(scatter: float, seed: int) -> None:

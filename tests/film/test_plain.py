@@ -18,6 +18,8 @@ from weathercoat.mesh.shapes import make_random_sheet, make_sphere
 from weathercoat.run import prepare_simulation
 from weathercoat.sim.simulation import Simulation
 
+pytestmark = pytest.mark.compiled
+
 
 def assert_same(fast: Simulation, plain: Simulation) -> None:
     """Mesh, film, log and flakes agree to the bit; that a separated vertex is disturbed matters to nobody."""

@@ -10,6 +10,8 @@ from weathercoat.film.state import FilmParameters
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.sim.simulation import Simulation, make_simulation
 
+pytestmark = pytest.mark.compiled
+
 
 def aged(seed: int) -> Simulation:
     film = FilmParameters(

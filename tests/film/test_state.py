@@ -84,6 +84,7 @@ def test_defects_by_share_are_that_many_edges(share: float) -> None:
     assert set(np.unique(state.cohesion)) <= {1000.0, 1000.0 * 0.001}
 
 
+@pytest.mark.compiled
 def test_defects_by_area_do_not_hang_on_the_mesh() -> None:
     """A unit sheet with 60 defects per unit area has 60, of 500 faces as of 4,000, at 4.5 sigma."""
     for faces in (500, 4000):

@@ -251,6 +251,7 @@ STAINS = {
 RULES = {"default": ({}, {}), "literal": (LITERAL_FILM, LITERAL_CURL)}
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("rules", RULES)
 @pytest.mark.parametrize("stains", STAINS)
 @pytest.mark.parametrize("name", SHAPES)
@@ -276,6 +277,7 @@ def test_runoff_equals_the_plain_version_bit_for_bit(name: str, stains: str, rul
     assert most > 10, "hardly any rust ran"
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(3))
 def test_any_order_of_newcomers_is_sorted(seed: int) -> None:
     """Many start at once, and in one tick many more: the order and the lists have to grow."""

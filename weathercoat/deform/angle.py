@@ -176,7 +176,7 @@ def _turn_face(
     py = positions[p3, 1] - positions[p1, 1]
     pz = positions[p3, 2] - positions[p1, 2]
     share = (px * ex + py * ey + pz * ez) / length
-    total = w1 * (1.0 - share) ** 2 + w2 * share**2 + w3
+    total = w1 * ((1.0 - share) * (1.0 - share)) + w2 * (share * share) + w3
     # the angle's gradient is -m / height at p3, and its reaction at the edge
     scale = (
         stiffness

@@ -80,7 +80,8 @@ def _strains(mesh: HalfEdgeMesh, is_free: NDArray[np.bool_], rest_length: Vector
         if rest_length[h] > 0.0:
             squared = 0.0
             for axis in range(3):
-                squared += (mesh.positions[a, axis] - mesh.positions[b, axis]) ** 2
+                side = mesh.positions[a, axis] - mesh.positions[b, axis]
+                squared += side * side
             out[found] = abs(math.sqrt(squared) / rest_length[h] - 1.0)
             found += 1
     return found

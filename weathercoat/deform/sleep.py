@@ -95,7 +95,8 @@ def note_moves(
             continue
         squared = 0.0
         for axis in range(3):
-            squared += (positions[v, axis] - last[v, axis]) ** 2
+            moved = positions[v, axis] - last[v, axis]
+            squared += moved * moved
             last[v, axis] = positions[v, axis]
         # false for a vertex that has no last position: NaN
         calm[v] = min(calm[v] + 1, _CALM) if squared < tolerance * tolerance else 0

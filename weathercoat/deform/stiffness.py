@@ -154,7 +154,7 @@ def hinge_second_derivative(
         d[axis] /= length
     for face in range(2):
         apex, foot = 2 + face, s if face == 0 else t
-        slope = math.sqrt(g[apex, 0] ** 2 + g[apex, 1] ** 2 + g[apex, 2] ** 2)
+        slope = math.sqrt(g[apex, 0] * g[apex, 0] + g[apex, 1] * g[apex, 1] + g[apex, 2] * g[apex, 2])
         height = 1.0 / slope
         for axis in range(3):
             away = positions[hinge[apex], axis] - positions[hinge[0], axis] - foot * length * d[axis]

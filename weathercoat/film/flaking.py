@@ -71,7 +71,8 @@ def rest_edge_length(rest_positions: Vectors, faces: Indices, h: int) -> float:
     a, b = faces[h // 3, h % 3], faces[h // 3, (h + 1) % 3]
     squared = 0.0
     for axis in range(3):
-        squared += (rest_positions[a, axis] - rest_positions[b, axis]) ** 2
+        side = rest_positions[a, axis] - rest_positions[b, axis]
+        squared += side * side
     return math.sqrt(squared)
 
 
@@ -84,7 +85,8 @@ def rest_face_area(rest_positions: Vectors, faces: Indices, f: int) -> float:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         ui, uj = rest_positions[b, i] - rest_positions[a, i], rest_positions[b, j] - rest_positions[a, j]
         vi, vj = rest_positions[c, i] - rest_positions[a, i], rest_positions[c, j] - rest_positions[a, j]
-        squared += (ui * vj - uj * vi) ** 2
+        across = ui * vj - uj * vi
+        squared += across * across
     return 0.5 * math.sqrt(squared)
 
 

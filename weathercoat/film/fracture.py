@@ -316,7 +316,7 @@ def turn_from(old: Vectors, way: float, direction: Vectors) -> None:
     squared = 0.0
     for axis in range(3):
         direction[axis] = kept * old[axis] + (1.0 - kept) * direction[axis]
-        squared += direction[axis] ** 2
+        squared += direction[axis] * direction[axis]
     if squared > 0.0:
         direction /= math.sqrt(squared)
 

@@ -7,6 +7,8 @@ whatever changes what is round a vertex calls for packing it again.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ def find_in_fringe(
     separated, adhesion, rest_factor = state.separated, state.adhesion, state.lift_factor
     fringe, membership, hinges, sums = agenda.fringe, agenda.membership, agenda.hinges, agenda.sums
     scale = rules.lift_coefficient * (1.0 if rules.lifts_by_face else drying_tension(rules, age))
-    per_scale = 1.0 / (scale * (1.0 + SLACK))
+    per_scale = 1.0 / (scale * (1.0 + SLACK)) if scale > 0.0 else math.inf
     loss = rules.adhesion_loss_rate * age
     count = agenda.counts[FRINGE]
     i = 0

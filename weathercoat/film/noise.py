@@ -41,8 +41,10 @@ def stream_key(seed: int, name: str) -> np.uint64:
 
 def hash_uniform(points: Vectors, key: np.uint64) -> Vectors:
     """A number in [0, 1) for each of the points (n, 3), given in sizes."""
+    cells = np.floor(points / _QUANTUM + _SHIFT).astype(np.int64).view(np.uint64)
     out = np.empty(len(points))
-    _hash_points(np.floor(points / _QUANTUM + _SHIFT).astype(np.int64).view(np.uint64), key, out)
+    with np.errstate(over="ignore"):  # without the JIT, NumPy warns of what is meant to wrap round
+        _hash_points(cells, key, out)
     return out
 
 

@@ -52,8 +52,8 @@ def unload_round_crack(
         entered = stack[depth]
         f = entered // 3
         x, y, z = centre[f, 0], centre[f, 1], centre[f, 2]
-        to_start = (x - ax) ** 2 + (y - ay) ** 2 + (z - az) ** 2
-        to_end = (x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2
+        to_start = (x - ax) * (x - ax) + (y - ay) * (y - ay) + (z - az) * (z - az)
+        to_end = (x - bx) * (x - bx) + (y - by) * (y - by) + (z - bz) * (z - bz)
         along = ((x - ax) * ex + (y - ay) * ey + (z - az) * ez) / per_length
         if length == 0.0 or along < 0.0:
             distance = math.sqrt(to_start)
@@ -101,7 +101,7 @@ def rest_direction(mesh: HalfEdgeMesh, source: int, target: int, out: Vectors) -
     length = 0.0
     for axis in range(3):
         out[axis] = mesh.rest_positions[target, axis] - mesh.rest_positions[source, axis]
-        length += out[axis] ** 2
+        length += out[axis] * out[axis]
     length = math.sqrt(length)
     if length > 0.0:
         out /= length
@@ -136,7 +136,7 @@ def tension_across(
         step = mesh.rest_positions[mesh.origin[b], axis] - mesh.rest_positions[mesh.origin[a], axis]
         along += state.relief[f, axis] * step
         length += step * step
-        relieved += state.relief[f, axis] ** 2
+        relieved += state.relief[f, axis] * state.relief[f, axis]
     tension = tension_until(state, rules, f, age, later)
     if relieved == 0.0 or length == 0.0:
         return tension
