@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
+from weathercoat.errors import LimitError
 
 # Up to here a fan has no slivers to speak of; and a fan from the first corner is what other programs show.
 MAX_FAN = 8
+# Times that all corners of a polygon that crosses itself are looked at for ears.
+MAX_LOOKS = 4
+# Corners that may be looked at in all to tell whether others are ears: some 20 s.
+MAX_WORK = 20_000_000_000
 
 
 def triangulate(
@@ -41,7 +46,13 @@ def triangulate(
     rest = np.flatnonzero(~fanned)
     if len(rest):
         longest = int(sizes[rest].max())
-        _clip_polygons(positions, corners, first[rest], sizes[rest], begin[rest], longest, triangles)
+        work = np.array([MAX_WORK])
+        _clip_polygons(positions, corners, first[rest], sizes[rest], begin[rest], longest, work, triangles)
+        if work[0] < 0:
+            raise LimitError(
+                f"concave polygons, of up to {longest} corners, take too long to cut into triangles",
+                remedy="triangulate the model before exporting",
+            )
     return triangles, polygon
 
 
@@ -54,13 +65,14 @@ def _is_fan(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 @kernel
-def _clip_polygons(positions, corners, first, sizes, begin, longest, triangles):  # type: ignore[no-untyped-def]
+def _clip_polygons(positions, corners, first, sizes, begin, longest, work, triangles):  # type: ignore[no-untyped-def]
+    """`work` (1,) is what may be done, then what is left of it; below 0 not all triangles are set."""
     flat = np.empty((longest, 2))
     for q in range(len(first)):
         n = sizes[q]
         _flatten(positions, corners[first[q] : first[q] + n], flat)
         part = triangles[begin[q] : begin[q] + n - 2]
-        _clip_ears(flat[:n], part)
+        _clip_ears(flat[:n], work, part)
         part += first[q]
 
 
@@ -94,23 +106,79 @@ def _turn(p, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _is_ear(p, following, reflex, a, b, c):  # type: ignore[no-untyped-def]
+def _make_grid(p):  # type: ignore[no-untyped-def]
+    """The points (n, 2) in about n cells, nearly square, of a grid over them: its origin and cells per length
+    along both axes, its shape, where each cell begins, and the points cell by cell."""
+    n = len(p)
+    origin = np.array([p[:, 0].min(), p[:, 1].min()])
+    extent = np.array([p[:, 0].max(), p[:, 1].max()]) - origin
+    shape = np.ones(2, np.int64)
+    if extent[0] > 0 and extent[1] > 0:
+        shape[0] = min(max(np.int64(np.sqrt(n * (extent[0] / extent[1]))), 1), n)
+    elif extent[0] > 0:
+        shape[0] = n
+    shape[1] = n // shape[0]
+    rate = np.zeros(2)
+    for axis in range(2):
+        if extent[axis] > 0:
+            rate[axis] = shape[axis] / extent[axis]
+    begin = np.zeros(shape[0] * shape[1] + 1, np.int64)
+    cell = np.empty(n, np.int64)
+    for i in range(n):
+        x = _place(p[i, 0], origin[0], rate[0], shape[0])
+        y = _place(p[i, 1], origin[1], rate[1], shape[1])
+        cell[i] = x * shape[1] + y
+        begin[cell[i] + 1] += 1
+    begin = np.cumsum(begin)
+    fill = begin.copy()
+    points = np.empty(n, np.int64)
+    for i in range(n):
+        points[fill[cell[i]]] = i
+        fill[cell[i]] += 1
+    return origin, rate, shape, begin, points
+
+
+@kernel
+def _place(x, origin, rate, count):  # type: ignore[no-untyped-def]
+    """The cell of a coordinate, which never falls as the coordinate rises."""
+    return min(np.int64((x - origin) * rate), count - 1)
+
+
+@kernel
+def _is_ear(p, grid, reflex, work, a, b, c):  # type: ignore[no-untyped-def]
     """Whether no reflex corner of the rest lies in the triangle a, b, c, except at its corners."""
-    i = following[c]
-    while i != a:
-        if reflex[i]:
+    origin, rate, shape, begin, points = grid
+    first = np.empty(2, np.int64)
+    last = np.empty(2, np.int64)
+    for axis in range(2):
+        low = min(p[a, axis], p[b, axis], p[c, axis])
+        high = max(p[a, axis], p[b, axis], p[c, axis])
+        first[axis] = _place(low, origin[axis], rate[axis], shape[axis])
+        last[axis] = _place(high, origin[axis], rate[axis], shape[axis])
+    for x in range(first[0], last[0] + 1):
+        row = x * shape[1]
+        start, stop = begin[row + first[1]], begin[row + last[1] + 1]
+        work[0] -= stop - start
+        for k in range(start, stop):
+            i = points[k]
+            if not reflex[i] or i in (a, b, c):
+                continue
             at_corner = False
             for j in (a, b, c):
                 at_corner = at_corner or (p[i, 0] == p[j, 0] and p[i, 1] == p[j, 1])
             if not at_corner and _turn(p, a, b, i) >= 0 and _turn(p, b, c, i) >= 0 and _turn(p, c, a, i) >= 0:
                 return False
-        i = following[i]
     return True
 
 
 @kernel
-def _clip_ears(p, triangles):  # type: ignore[no-untyped-def]
-    """Triangles (n - 2, 3) of the polygon `p` (n, 2); without an ear (self-crossing), the next is cut off."""
+def _clip_ears(p, work, triangles):  # type: ignore[no-untyped-def]
+    """Triangles (n - 2, 3) of the polygon `p` (n, 2); without an ear (self-crossing), the next is cut off.
+
+    A corner that is no ear stays none until a neighbour of it is cut off, so it is not looked at before; only
+    where no candidate is left, which no simple polygon leads to, are all looked at again, so many times that
+    the work stays in proportion.
+    """
     n = len(p)
     previous = np.arange(-1, n - 1)
     previous[0] = n - 1
@@ -121,27 +189,70 @@ def _clip_ears(p, triangles):  # type: ignore[no-untyped-def]
     for i in range(n):
         reflex[i] = _turn(p, previous[i], i, following[i]) <= 0
         reflexes += reflex[i]
-    b = 1
+    grid = _make_grid(p)
+    # The candidates for the next ear, in the order of the outline.
+    before, after = previous.copy(), following.copy()
+    is_candidate = np.ones(n, np.bool_)
+    candidates = n
+    looks = MAX_LOOKS * n
+    b = home = 1
     done = 0
-    tried = 0
-    while done < n - 2:
+    is_new = True  # since all were looked at
+    while done < n - 2 and work[0] >= 0:
+        if candidates == 0 and is_new and looks >= n - done:
+            is_new = False
+            looks -= n - done
+            candidates = n - done
+            i = b = home
+            while True:
+                before[i], after[i] = previous[i], following[i]
+                is_candidate[i] = True
+                i = following[i]
+                if i == home:
+                    break
+        is_forced = candidates == 0
+        if is_forced:
+            b = home
         a, c = previous[b], following[b]
-        ear = not reflex[b] and (reflexes == 0 or _is_ear(p, following, reflex, a, b, c))
-        if not ear and tried < n - done:
-            b = c
-            tried += 1
+        if not is_forced and (reflex[b] or not (reflexes == 0 or _is_ear(p, grid, reflex, work, a, b, c))):
+            is_candidate[b] = False
+            candidates -= 1
+            before[after[b]], after[before[b]] = before[b], after[b]
+            b = after[b]
             continue
         triangles[done, 0] = a
         triangles[done, 1] = b
         triangles[done, 2] = c
         done += 1
-        tried = 0
+        is_new = True
         following[a] = c
         previous[c] = a
         reflexes -= reflex[b]
+        reflex[b] = False
         for i in (a, c):
             now = _turn(p, previous[i], i, following[i]) <= 0
             reflexes += np.int64(now) - np.int64(reflex[i])
             reflex[i] = now
         # Going on behind c spreads the ears instead of fanning them around one corner.
-        b = following[c]
+        home = following[c]
+        candidates = _replace(a, b, c, before, after, is_candidate, candidates)
+        b = after[c]
+
+
+@kernel
+def _replace(a, b, c, before, after, is_candidate, candidates):  # type: ignore[no-untyped-def]
+    """Take b out of the ring of candidates and its neighbours a and c in; returns their number."""
+    if not is_candidate[b]:  # the ring is empty
+        before[b] = after[b] = b
+        is_candidate[b] = True
+        candidates = 1
+    for i, at in ((a, before[b]), (c, b)):
+        if not is_candidate[i]:
+            is_candidate[i] = True
+            candidates += 1
+            before[i], after[i] = at, after[at]
+            before[after[at]] = i
+            after[at] = i
+    before[after[b]], after[before[b]] = before[b], after[b]
+    is_candidate[b] = False
+    return candidates - 1
