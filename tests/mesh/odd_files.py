@@ -136,6 +136,8 @@ def _obj() -> Iterator[OddFile]:
     yield odd("only_one_corner", square + "f 1\nf 2\n", code="E-NOAREA")
     yield odd("comment_of_5_MB", "#" + 5_000_000 * "x" + "\n" + cube())
     yield odd("line_of_a_million_blanks", cube().replace("v 1", "v" + 1_000_000 * " " + "1", 1))
+    yield odd("uv_first", "vt 0 0\n" * 20_000 + cube())
+    yield odd("licence_first", "# all rights\n" * 20_000 + cube())
     yield odd("many_groups", _many_groups(20_000), faces=20_000, area=1e4, notes=("W-SOUP",))
     yield odd("twice_the_same", cube() + f, notes=("W-DUPLICATE",))
     yield odd(
@@ -259,7 +261,7 @@ def _ply() -> Iterator[OddFile]:
     yield odd("type_int64", text.replace("float x", "int64 x"), code="E-CORRUPT", says="line 4")
     yield odd("version_2", text.replace("ascii 1.0", "ascii 2.0"), code="E-CORRUPT", says="line 2")
     yield odd("no_z", text.replace("float z", "float w"), code="E-CORRUPT", says="number z")
-    yield odd("x_twice", text.replace("float y", "float x"), code="E-CORRUPT", says="line 5")
+    yield odd("x_twice", text.replace("float y", "float x"), code="E-CORRUPT", says="'x' twice")
     yield odd(
         "x_is_a_list",
         _ply_text(
@@ -782,9 +784,11 @@ def _strangers() -> Iterator[OddFile]:
         ("part.json", b'{"vertices": [0, 0, 0]}', "unknown"),
         ("part.png.obj", b"\x89PNG\r\n\x1a\n" + bytes(50), "picture"),
         ("part.ply.txt", _ply_text().encode(), "--format ply"),
+        ("part.md", b"# comments only\n", "unknown"),
         ("part", b"hello", "text"),
     ):
         yield OddFile(name, data, code="E-FORMAT", says=says)
+    yield OddFile("licence_without_extension", b"# all rights\n" * 20_000 + text)
     yield OddFile("off_named.ply", ("OFF\n8 6 12\n" + _PLY_ROWS + _PLY_FACES).encode(), notes=("W-FORMAT",))
     yield OddFile("glb_named.gltf", pack_glb(gltf_cube(), b""))
     yield OddFile("zip_named.obj", zipped({"cube.ply": _ply_text().encode()}), notes=("W-FORMAT",))

@@ -111,6 +111,13 @@ def test_every_corner_of_a_polygon_that_crosses_or_repeats_itself_is_used(
         assert {tuple(side) for side in found[times == 1].tolist()} == outline
 
 
+@pytest.mark.parametrize("scale", [(1e-321, 1.0), (1.0, 1e-321), (1e-321, 1e-321), (1e150, 1e-150), (0, 1)])
+def test_no_proportion_leads_out_of_the_grid(scale: tuple[float, float]) -> None:
+    for make in (star, crossing, rough_circle):
+        triangles = clipped([(scale[0] * x, scale[1] * y) for x, y in make(50)])
+        assert np.array_equal(np.unique(triangles), np.arange(50))
+
+
 def test_what_would_take_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("weathercoat.mesh.triangulate.MAX_WORK", 100_000)
     clipped(spiral(1000))

@@ -114,7 +114,7 @@ def _make_grid(p):  # type: ignore[no-untyped-def]
     extent = np.array([p[:, 0].max(), p[:, 1].max()]) - origin
     shape = np.ones(2, np.int64)
     if extent[0] > 0 and extent[1] > 0:
-        shape[0] = min(max(np.int64(np.sqrt(n * (extent[0] / extent[1]))), 1), n)
+        shape[0] = np.int64(min(max(np.sqrt(n * (extent[0] / extent[1])), 1), n))
     elif extent[0] > 0:
         shape[0] = n
     shape[1] = n // shape[0]
@@ -141,7 +141,11 @@ def _make_grid(p):  # type: ignore[no-untyped-def]
 @kernel
 def _place(x, origin, rate, count):  # type: ignore[no-untyped-def]
     """The cell of a coordinate, which never falls as the coordinate rises."""
-    return min(np.int64((x - origin) * rate), count - 1)
+    place = (x - origin) * rate
+    if place >= count:
+        return count - 1
+    # No comparison holds where a tiny extent makes the rate infinite and the place 0 times that.
+    return np.int64(place) if place > 0 else 0
 
 
 @kernel

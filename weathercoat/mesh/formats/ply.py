@@ -103,9 +103,7 @@ def _header(data: bytes) -> tuple[ByteOrder, list[Element], int, int]:
         if words == ["end_header"]:
             if order is None:
                 raise CorruptError("the header names no format")
-            for element in elements:
-                if element.count and not element.properties:
-                    raise CorruptError(f"the header names no property of element {element.name}")
+            _check_names(elements)
             return order, elements, at, number + 1
         if (words == ["ply"] and number == 1) or not words or words[0] in ("comment", "obj_info"):
             continue
@@ -119,11 +117,24 @@ def _header(data: bytes) -> tuple[ByteOrder, list[Element], int, int]:
     raise CorruptError("the header has no end")
 
 
+def _check_names(elements: list[Element]) -> None:
+    """Refuse a name that is given twice, and rows without properties."""
+    names = {"the file": [e.name for e in elements]}
+    names |= {f"element {e.name}": [p.name for p in e.properties] for e in elements}
+    for owner, given in names.items():
+        if len(set(given)) < len(given):
+            twice = next(name for i, name in enumerate(given) if name in given[:i])
+            raise CorruptError(f"the header of {owner} names {twice[:40]!r} twice")
+    for element in elements:
+        if element.count and not element.properties:
+            raise CorruptError(f"the header names no property of element {element.name}")
+
+
 def _declare(words: list[str], elements: list[Element]) -> None:
     """Add what a line of the header declares; KeyError, IndexError or ValueError where it is none."""
     if words[0] == "element":
         _, name, count = words
-        if not re.fullmatch(r"[0-9]{1,99}", count) or any(name == element.name for element in elements):
+        if not re.fullmatch(r"[0-9]{1,99}", count):
             raise ValueError
         elements.append(Element(name, int(count), []))
         return
@@ -137,8 +148,6 @@ def _declare(words: list[str], elements: list[Element]) -> None:
         new = Property(name, _TYPES[type])
         if keyword != "property":
             raise ValueError
-    if any(new.name == other.name for other in elements[-1].properties):
-        raise ValueError
     elements[-1].properties.append(new)
 
 

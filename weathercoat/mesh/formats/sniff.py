@@ -39,6 +39,10 @@ _STRANGERS = (
 )
 
 
+# Programs write whole licences before the first line that tells.
+_COMMENTS = re.compile(rb"(?:\xef\xbb\xbf)?+\s*+(?:#[^\r\n]*+\s*+)*+")
+
+
 def identify(data: bytes, extension: str) -> tuple[str, Note | None]:
     """The format of `data` named with `extension` (no dot, lower case), and W-FORMAT where the two disagree.
 
@@ -86,8 +90,10 @@ def _content(data: bytes) -> str | None:
 
 
 def _text_start(data: bytes) -> bytes | None:
-    """The first 64 kB as normalised text, or None for binary data."""
-    start = data[:65536]
+    """The first 64 kB behind comments as normalised text, or None for binary data."""
+    comments = _COMMENTS.match(data)
+    begin = comments.end() if comments else 0
+    start = data[begin : begin + 65536]
     if start.startswith((b"\xff\xfe", b"\xfe\xff")):
         start = start[: len(start) // 2 * 2].decode("utf-16", "replace").encode()
     start = normalise(start)
@@ -100,7 +106,7 @@ def _looks_like_obj(start: bytes) -> bool:
     lines = [line.split() for line in start.split(b"\n")[:2000]]
     words = [line[0].decode("latin-1") for line in lines if line and not line[0].startswith(b"#")]
     known = sum(word in KEYWORDS for word in words)
-    return any(word in ("v", "f") for word in words) and known > 0.5 * len(words)
+    return any(word in ("v", "vt", "vn", "f") for word in words) and known > 0.5 * len(words)
 
 
 def _by_extension(data: bytes, extension: str) -> str:
