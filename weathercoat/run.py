@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, fields
@@ -214,7 +215,8 @@ def _read(
     if isinstance(model, (str, Path)):
         require_memory_to_read(Path(model), limit)
         surface = read_surface(model, format=format, up=config.model.up)
-        return surface, {Path(model).name: sha256(Path(model))}
+        name = os.fsencode(Path(model).name).decode("utf-8", "surrogateescape")  # in every locale alike
+        return surface, {name: sha256(Path(model))}
     content = model.read(MAX_BYTES + 1)  # one too many is refused below
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
 
