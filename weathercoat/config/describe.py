@@ -11,6 +11,7 @@ from weathercoat.config.document import read_value
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config, Parameter, Section, parameters, section_of
 
+_WIDEST = 80  # characters; comments stand beside values that are no longer
 _EXAMPLE_HEADER = """\
 # The defaults, spelled out: a file to start from. Every key may be left out.
 # Lengths are in sizes (the square root of the area), times in ages: one config fits a model of any scale.
@@ -59,7 +60,7 @@ def resolved_yaml(loaded: LoadedConfig) -> str:
         value = values[section][name] if section else values[name]
         if value is not None:
             rows.append((f"{'  ' if section else ''}{name}: {_value(value)}", origin))
-    width = max(len(text) for text, _ in rows)
+    width = min(max(len(text) for text, _ in rows), _WIDEST)
     return "".join(f"{text:{width}}  # {origin}\n" if origin else f"{text}\n" for text, origin in rows)
 
 

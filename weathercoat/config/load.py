@@ -19,7 +19,7 @@ from weathercoat.config.document import LARGEST_FILE, Item, read_document, read_
 from weathercoat.config.presets import preset_names, preset_path
 from weathercoat.config.quality import AUTO, point_of, with_point
 from weathercoat.config.schema import Config, parameters, section_at
-from weathercoat.config.wording import KeyPath, color_hint, did_you_mean, explain
+from weathercoat.config.wording import KeyPath, color_hint, did_you_mean, explain, shortened
 from weathercoat.errors import ConfigError, ConfigProblem
 
 DEFAULT = "default"
@@ -85,7 +85,7 @@ def load_config(
         if name in preset_names():
             merge.add(_preset_layer(name))
         else:
-            what = f"no shipped config {name!r}; there are {', '.join(preset_names())}"
+            what = f"no shipped config {shortened(name)}; there are {', '.join(preset_names())}"
             merge.problems.append(ConfigProblem(*origin, "preset", what))
     for layer in layers:
         merge.add(layer)
@@ -125,7 +125,7 @@ def resolved_keys(config: Config) -> list[str]:
 
 
 def _read_layer(source: str) -> _Layer:
-    if not Path(source).is_file() and source in preset_names():
+    if not os.path.isfile(source) and source in preset_names():  # noqa: PTH113 (any text will do)
         return _preset_layer(source)
     return _Layer(read_document(_read_file(source), source), source)
 
@@ -172,7 +172,7 @@ def _override_layer(override: str | Override) -> _Layer:
     if isinstance(override, str):
         key, sign, text = override.partition("=")
         if not sign or not all(key.split(".")):
-            raise ConfigError.at("--set", f"{override!r} must be key.path=value")
+            raise ConfigError.at("--set", f"{shortened(override)} must be key.path=value")
         override = Override(key, read_value(text, "--set", key))
     item = Item(override.value, 0)
     for name in reversed(override.key.split(".")):

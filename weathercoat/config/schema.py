@@ -63,12 +63,19 @@ def _parse_up(value: object) -> object:
     raise ValueError("must be auto, x, y, z, -x, -y, -z or three numbers that are not all 0")
 
 
-def _parse_remesh(value: object) -> object:
+def _parse_switch(value: object) -> object:
     """Off and on as YAML 1.1 reads them (booleans) and as YAML 1.2 does (words)."""
-    if value is False or value in ("off", "no"):
-        return False
-    if value is True or value in ("on", "yes"):
-        return {}
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, str) and value in _SWITCH:
+        return _SWITCH[value]
+    raise ValueError("must be true or false")
+
+
+def _parse_remesh(value: object) -> object:
+    """A mapping as it is, {} for on, which means the defaults, and false for off."""
+    if isinstance(value, bool | str) and value in (True, False, *_SWITCH):
+        return {} if _parse_switch(value) else False
     return value
 
 
@@ -76,10 +83,15 @@ def _remesh_tag(value: object) -> str:
     return "off" if value is False else "mapping"
 
 
+_SWITCH = {"on": True, "yes": True, "off": False, "no": False}
+_SWITCH_SCHEMA = {"enum": [True, False, *_SWITCH]}
+_FORMAT_SCHEMA = {"type": "string", "enum": ["ply", "glb"]}
+
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 Real = Annotated[float, BeforeValidator(_require_number)]
 Whole = Annotated[int, BeforeValidator(_require_number)]
 PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(_require_number)] | None
+Switch = Annotated[bool, BeforeValidator(_parse_switch), WithJsonSchema(_SWITCH_SCHEMA)]
 Names = Annotated[
     tuple[str, ...],
     BeforeValidator(_at_least_one_word),
@@ -442,15 +454,17 @@ class Output(Section):
         tuple[Literal["ply", "glb"], ...],
         BeforeValidator(_at_least_one_word),
         Field(min_length=1),
+        WithJsonSchema(
+            {"anyOf": [_FORMAT_SCHEMA, {"type": "array", "items": _FORMAT_SCHEMA, "minItems": 1}]}
+        ),
     ] = parameter(("ply", "glb"), "Formats of the snapshots' meshes")
-    preview: bool = parameter(True, "Whether a contact sheet of all snapshots is drawn")
+    preview: Switch = parameter(True, "Whether a contact sheet of all snapshots is drawn")
     picture_width: Whole = parameter(640, "Width of a picture", unit="pixels", ge=16, le=16_384)
     picture_height: Whole = parameter(480, "Height of a picture", unit="pixels", ge=16, le=16_384)
 
 
 RemeshOrOff = Annotated[
-    Annotated[Remesh, Tag("mapping")]
-    | Annotated[Literal[False], Tag("off"), WithJsonSchema({"enum": [False, True, "off", "on"]})],
+    Annotated[Remesh, Tag("mapping")] | Annotated[Literal[False], Tag("off"), WithJsonSchema(_SWITCH_SCHEMA)],
     Discriminator(_remesh_tag),
     BeforeValidator(_parse_remesh),
 ]

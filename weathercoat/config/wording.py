@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
-from weathercoat.config.schema import parameters, section_at
+from weathercoat.config.schema import Parameter, parameters, section_at
 
 KeyPath = tuple[str, ...]
 
@@ -59,6 +60,11 @@ def _shown(value: Any) -> str:
         return "a number of over 30 digits"
     if isinstance(value, float) and not math.isfinite(value):
         return "infinite or not a number"
+    return shortened(value)
+
+
+def shortened(value: Any) -> str:
+    """The value as Python spells it, the first 40 characters."""
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
 
@@ -73,13 +79,19 @@ def _nearest_key(path: KeyPath) -> str:
         if match and difflib.SequenceMatcher(None, name, match[0].removeprefix(prefix)).ratio() >= 0.6:
             return f"; did you mean {match[0]}?"
     symbol = _SPELLED_SYMBOLS.get(name, name)
-    known = list(parameters())
+    known = _known()
     by_symbol = [parameter.key for parameter in known if parameter.symbol == symbol]
     if by_symbol:
         return f"; did you mean {by_symbol[0]}?"
     by_name = {parameter.key.rpartition(".")[2]: parameter.key for parameter in reversed(known)}
     near = difflib.get_close_matches(name, by_name, 1)
     return f"; did you mean {by_name[near[0]]}?" if near else ""
+
+
+@cache
+def _known() -> tuple[Parameter, ...]:
+    """Every parameter of the schema."""
+    return tuple(parameters())
 
 
 def did_you_mean(word: Any, candidates: Iterable[str]) -> str:
