@@ -272,9 +272,14 @@ def without_pictures(files: dict[str, str]) -> dict[str, str]:
 # --- random streams ---
 
 
+def sources() -> list[Path]:
+    """The modules of the package, but for the benchmarks, which lay out films of their own."""
+    return [path for path in sorted(PACKAGE.rglob("*.py")) if "bench" not in path.parts]
+
+
 def calls_of(names: set[str]) -> Iterator[tuple[Path, ast.Call]]:
-    """Every call of a function or method of one of these names in the package."""
-    for path in sorted(PACKAGE.rglob("*.py")):
+    """Every call of a function or method of one of these names in what a run is made of."""
+    for path in sources():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in names:
                 yield path, node
@@ -293,7 +298,7 @@ def test_random_streams_are_documented_and_have_names_of_their_own() -> None:
 
 def test_there_are_no_other_random_numbers() -> None:
     """Neither Python's nor NumPy's shared generators, nor a generator that is seeded by chance."""
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sources():
         source = path.read_text(encoding="utf-8")
         assert not re.search(r"^\s*(import|from) random\b", source, re.MULTILINE), path
         used = set(re.findall(r"\bnp\.random\.(\w+)", source))

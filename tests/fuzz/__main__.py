@@ -6,7 +6,7 @@ import argparse
 import importlib
 import sys
 
-KINDS = {"files": "tests.fuzz.files", "configs": "tests.fuzz.configs"}
+KINDS = {"files": "tests.fuzz.files", "configs": "tests.fuzz.configs", "runs": "tests.fuzz.runs"}
 """Modules by kind. `main` takes the arguments after the kind, at least `--count`, `--seed` and `--seconds`,
 and returns the number of violations."""
 
