@@ -2,10 +2,10 @@
 
 Other machines are emulated on this one, each in a process of its own: kernels compiled for the oldest
 processor of 64 bits (without AVX and FMA), the C library's mathematical functions without FMA, NumPy without
-AVX2, BLAS for an older core, and all of it at once. Every run is whole: the model is remeshed and
-aged there. Compared are, at several ages, what has broken and fallen (the same edges and faces or not),
-positions of the film's corners [sizes], and counts; the spread of these between seeds stands beside. Compiling
-for the oldest processor takes minutes, once: `--cache` keeps the result.
+AVX2, BLAS for an older core, and all of it at once. Every run is whole: the model is remeshed and aged there.
+Compared are, at several ages, what has broken and fallen (the same edges and faces or not), positions of the
+film's corners [sizes], and counts; the spread of these between seeds stands beside. Compiling for the oldest
+processor takes minutes, once: `--cache` keeps the result.
 """
 
 from __future__ import annotations

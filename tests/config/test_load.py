@@ -62,6 +62,14 @@ def test_presets_in_a_list_the_last_winning(write: Callable[[str], str]) -> None
     assert load_config(path, ["preset=literal"]).config.curl.rule == "angle"
 
 
+def test_a_preset_that_is_named_again_counts_where_it_comes_last(write: Callable[[str], str]) -> None:
+    again = load_config(write("preset: [crackle, curling, crackle]\n")).config
+    assert again.curl == load_config(write("preset: [curling, crackle]\n")).config.curl
+    assert again.curl != load_config(write("preset: [crackle, curling]\n")).config.curl
+    many = load_config(write(f"preset: [{'literal, ' * 3000}crackle]\n")).config
+    assert many.lift == load_config(write("preset: [literal, crackle]\n")).config.lift
+
+
 def test_a_file_comes_before_a_preset_of_the_same_name(write: Callable[[str], str]) -> None:
     write("")
     Path("crackle").write_text("seed: 99\n")

@@ -50,7 +50,7 @@ _WORK: dict[str, tuple[int, ...]] = {
     "output.picture_width": (16, 40),
     "output.picture_height": (16, 30),
 }
-_SOLVERS = list(get_args(Deformation.model_fields["solver"].annotation))
+SOLVERS = list(get_args(Deformation.model_fields["solver"].annotation))
 # Not part of a run's physics, or in need of a second value that goes with the first.
 _LEFT = {
     "version",
@@ -68,7 +68,7 @@ def _bent(random: Random) -> Surface:
     return shapes.make_curved_plate(columns=12, rows=9, angle=float(random.uniform(5, 350)))
 
 
-_MESHES: dict[str, Callable[[Random], Surface]] = {
+MESHES: dict[str, Callable[[Random], Surface]] = {
     "sheet": lambda random: shapes.make_random_sheet(
         int(random.integers(100, 800)), seed=int(random.integers(99))
     ),
@@ -115,7 +115,7 @@ def make_case(seed: int, number: int) -> Case:
         values[key] = valid_value(parameter, random)
     values |= {key: one(list(choices)) for key, choices in _WORK.items()}
     values["ageing.steps"] = _STEPS
-    values["deformation.solver"] = one(_SOLVERS)
+    values["deformation.solver"] = one(SOLVERS)
     if random.random() < 0.5:
         values["adhesion.base"] = float(random.uniform(0.1, 1.0))  # so that more films separate in part
     if random.random() < 0.6:
@@ -125,7 +125,7 @@ def make_case(seed: int, number: int) -> Case:
     if law == "saturating" and values.get("tension.initial", 0) > 1:
         values["tension.initial"] = 1
     return Case(
-        mesh=one(sorted(_MESHES)),
+        mesh=one(sorted(MESHES)),
         seed=int(random.integers(1000)),
         scale=float(one([1.0, 1.0, 1e-9, 1e-3, 1e3, 1e9])),
         offset=float(one([0.0, 0.0, 1.0, 1e5])),
@@ -141,7 +141,7 @@ def load(config: str, values: dict[str, Any]) -> LoadedConfig:
 
 def make_model(case: Case) -> Surface:
     """The mesh of a case, some of its sizes away from the origin."""
-    surface = _MESHES[case.mesh](np.random.default_rng(case.seed))
+    surface = MESHES[case.mesh](np.random.default_rng(case.seed))
     vertices = (surface.vertices / surface.size() + case.offset) * case.scale
     return replace(surface, vertices=vertices)
 

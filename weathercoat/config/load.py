@@ -181,14 +181,15 @@ def _override_layer(override: str | Override) -> _Layer:
 
 
 def _wanted_presets(layers: Iterable[_Layer]) -> list[tuple[str, _Origin]]:
-    """The presets that the last layer with the key `preset` names."""
-    wanted: list[tuple[str, _Origin]] = []
+    """The presets that the last layer with the key `preset` names; one that comes again comes only then."""
+    wanted: dict[str, _Origin] = {}
     for layer in layers:
         if "preset" in layer.values:
             item = layer.values["preset"]
             names = item.value if isinstance(item.value, list) else [item.value]
-            wanted = [(name, _Origin(layer.where, item.line)) for name in names if isinstance(name, str)]
-    return wanted
+            last_first = dict.fromkeys(name for name in reversed(names) if isinstance(name, str))
+            wanted = dict.fromkeys(reversed(last_first), _Origin(layer.where, item.line))
+    return list(wanted.items())
 
 
 class _Merge:
