@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, fields
@@ -22,7 +21,7 @@ from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, Weat
 from weathercoat.film.state import FilmParameters
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
-from weathercoat.mesh.read import MAX_BYTES, read_stream, read_surface
+from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
@@ -215,8 +214,7 @@ def _read(
     if isinstance(model, (str, Path)):
         require_memory_to_read(Path(model), limit)
         surface = read_surface(model, format=format, up=config.model.up)
-        name = os.fsencode(Path(model).name).decode("utf-8", "surrogateescape")  # in every locale alike
-        return surface, {name: sha256(Path(model))}
+        return surface, {name_of(Path(model)): sha256(Path(model))}
     content = model.read(MAX_BYTES + 1)  # one too many is refused below
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
 

@@ -6,6 +6,7 @@ model's folder is read, and nothing from the network.
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 from typing import BinaryIO
@@ -56,10 +57,15 @@ def read_surface(
     direction = _direction(up)
     try:
         data = _load(path)
-        return _make_surface(data, path, path.name, format, direction, max_faces)
+        return _make_surface(data, path, name_of(path), format, direction, max_faces)
     except WeathercoatError as error:
         error.file = error.file or str(path)
         raise
+
+
+def name_of(path: Path) -> str:
+    """The name of a file, read as UTF-8 whatever the locale, so that it is written the same in all."""
+    return os.fsencode(path.name).decode("utf-8", "surrogateescape")
 
 
 def read_stream(
