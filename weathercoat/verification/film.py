@@ -65,7 +65,7 @@ def check_arrays(ledger: Ledger, file: str, snapshot: PlySnapshot) -> bool:
         sound &= ledger.expect_all(
             "finite",
             file,
-            np.isfinite(values).all(axis=1),
+            np.isfinite(values),
             tell(values, name, "finite"),
         )
     low = np.zeros(face_count, np.int64)
@@ -75,7 +75,7 @@ def check_arrays(ledger: Ledger, file: str, snapshot: PlySnapshot) -> bool:
     sound &= ledger.expect_all(
         "indices",
         file,
-        ((snapshot.faces >= low[:, None]) & (snapshot.faces < high[:, None])).all(axis=1),
+        (snapshot.faces >= low[:, None]) & (snapshot.faces < high[:, None]),
         lambda i: _tell_index(i, snapshot, metal, metal_faces),
     )
     origin = snapshot.origin
@@ -162,7 +162,7 @@ def check_film(ledger: Ledger, file: str, snapshot: PlySnapshot, metal: Metal) -
     sound &= ledger.expect_all(
         "film-over-metal",
         file,
-        (origin[faces] == expected).all(axis=1),
+        origin[faces] == expected,
         lambda i: (
             f"film face {i} has corners of the origins {_list(origin[faces[i]])},"
             f" but metal face {over[i]} beneath it has {_list(expected[i])}"
@@ -199,12 +199,12 @@ def _check_places(ledger: Ledger, file: str, snapshot: PlySnapshot, metal: Metal
     origin = snapshot.origin[count:]
     way = snapshot.positions[count:] - metal.vertices[origin]
     attached = snapshot.separated[count:] == 0
-    off = np.abs(way).max(axis=1, initial=0.0)
+    off = np.abs(way)
     ledger.expect_all(
         "attached",
         file,
-        ~attached | (off <= metal.reach),
-        lambda i: f"film vertex {i} is attached, but {off[i]:.3g} off the metal",
+        (off <= metal.reach) | ~attached[:, None],
+        lambda i: f"film vertex {i} is attached, but {off[i].max():.3g} off the metal",
     )
     height = np.einsum("ij,ij->i", way, metal.normals[origin])
     distance = np.sqrt(np.einsum("ij,ij->i", way, way))

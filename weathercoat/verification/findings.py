@@ -43,15 +43,16 @@ class Ledger:
         self,
         check: str,
         file: str,
-        holds: NDArray[np.bool_] | np.bool_,
+        holds: NDArray[np.bool_],
         message: Callable[[int], str],
     ) -> bool:
-        """As `expect`, for the rows of `holds` (n,): `message` tells of the first that fails, by its
-        number."""
+        """As `expect`, for the rows of `holds`, (n,) or (n, j): `message` tells of the first that fails, by
+        its number.
+        """
         self.checks += 1
         if holds.all():
             return True
-        failing = np.flatnonzero(~holds)
+        failing = np.flatnonzero(~holds.reshape(len(holds), -1).all(axis=1))
         more = f", and {len(failing) - 1:,} more" if len(failing) > 1 else ""
         self.findings.append(Finding(check, file, message(int(failing[0])) + more))
         return False

@@ -116,18 +116,17 @@ def check_same(ledger: Ledger, file: str, snapshot: PlySnapshot, metal: Metal) -
         ledger.expect(
             "metal-unchanged", file, False, f"the hair is {snapshot.hair}, before it was {metal.hair}"
         )
-    moved = (snapshot.positions[:count] == metal.stored).all(axis=1)
-    moved &= (snapshot.normals[:count] == metal.stored_normals).all(axis=1)
+    stays = (snapshot.positions[:count] == metal.stored) & (snapshot.normals[:count] == metal.stored_normals)
     same = ledger.expect_all(
         "metal-unchanged",
         file,
-        moved,
+        stays,
         lambda i: f"metal vertex {i} is not where it was in the snapshot before",
     )
     same &= ledger.expect_all(
         "metal-unchanged",
         file,
-        (snapshot.faces[:face_count] == metal.faces).all(axis=1),
+        snapshot.faces[:face_count] == metal.faces,
         lambda i: f"metal face {i} has other corners than in the snapshot before",
     )
     return same

@@ -175,13 +175,13 @@ class _Run:
         self.ledger.expect_all(
             "finite",
             name,
-            np.isfinite(positions).all(axis=1),
+            np.isfinite(positions),
             lambda i: f"the position of vertex {i} is not finite",
         )
         self.ledger.expect_all(
             "indices",
             name,
-            ((faces >= 0) & (faces < len(positions))).all(axis=1),
+            (faces >= 0) & (faces < len(positions)),
             lambda i: f"face {i} has corners {faces[i].tolist()}, but there are {len(positions):,} vertices",
         )
 

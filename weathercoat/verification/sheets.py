@@ -179,7 +179,7 @@ def _check_primitive(ledger: Ledger, file: str, where: str, primitive: Primitive
         sound &= ledger.expect_all(
             "glb-finite",
             file,
-            np.isfinite(values).reshape(count, -1).all(axis=1),
+            np.isfinite(values),
             _tell(f"{where}: {name} of vertex", "is not finite"),
         )
     if not sound:
@@ -238,13 +238,13 @@ def _compare(
     corners = numbers[faces.ravel()]
     count = len(primitive.attributes["POSITION"])
     source = np.zeros(count, np.int64)
-    used = np.zeros(count, np.bool_)
+    unused = np.ones(count, np.bool_)
     source[indices] = corners
-    used[indices] = True
+    unused[indices] = False
     if not ledger.expect_all(
         "formats-agree",
         file,
-        (source[indices] == corners).reshape(-1, 3).all(axis=1),
+        (source[indices] == corners).reshape(-1, 3),
         lambda i: f"{what}: face {i} has a vertex that stands for two of the PLY",
     ):
         return
@@ -253,14 +253,14 @@ def _compare(
     ledger.expect_all(
         "formats-agree",
         file,
-        (off <= slack).all(axis=1) | ~used,
+        (off <= slack) | unused[:, None],
         lambda i: f"{what}: vertex {i} is {off[i].max():.3g} off vertex {source[i]} of the PLY",
     )
     for name, values in rows.items():
         ledger.expect_all(
             "formats-agree",
             file,
-            (primitive.attributes[name] == values[source]) | ~used,
+            (primitive.attributes[name] == values[source]) | unused,
             _tell(f"{what}: {name} of vertex", "is not that of the PLY"),
         )
     if colors is not None:
@@ -268,7 +268,7 @@ def _compare(
         ledger.expect_all(
             "formats-agree",
             file,
-            ((shade >= _DARKEST[byte]) & (shade <= _BRIGHTEST[byte])).all(axis=1) | ~used,
+            (shade >= _DARKEST[byte]) & (shade <= _BRIGHTEST[byte]) | unused[:, None],
             lambda i: f"{what}: the colour of vertex {i} is not that of vertex {source[i]} of the PLY",
         )
 
