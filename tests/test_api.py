@@ -46,3 +46,10 @@ def test_errors_are_the_package_s_own(tmp_path: Path) -> None:
         weathercoat.write(tmp_path / "aged.txt", snapshot)
     with pytest.raises(AttributeError):
         _ = weathercoat.missing
+
+
+@pytest.mark.parametrize("name", ["aged.ply", "aged.glb", "aged.png"])
+def test_a_folder_that_is_missing(tmp_path: Path, name: str) -> None:
+    snapshot = weathercoat.simulate(make_box(), "standard", ["ageing.steps=1"]).snapshot()
+    with pytest.raises(OutputError, match="No such file"):
+        weathercoat.write(tmp_path / "none" / name, snapshot)

@@ -14,7 +14,7 @@ from weathercoat.cli.handler import call
 from weathercoat.config.load import load_config
 from weathercoat.cost import estimate_cost, faces_that_fit
 from weathercoat.errors import LimitError, UsageError
-from weathercoat.memory import parse_size, usable_memory
+from weathercoat.memory import MemoryLimit, memory_limit, parse_size, usable_memory
 from weathercoat.mesh.shapes import make_plate
 from weathercoat.output.meshes import write_mesh
 from weathercoat.run import run_asset
@@ -39,6 +39,16 @@ def test_the_least_limit_counts_and_says_what_it_is(monkeypatch: pytest.MonkeyPa
     limit = usable_memory()
     assert limit is not None
     assert limit.bytes == 10**7 and "control group" in limit.origin
+
+
+def test_a_wanted_limit_counts_instead_of_all_but_those_of_the_shell(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "_soft_limits", lambda: iter([MemoryLimit(10.0, "free")]))
+    monkeypatch.setattr(memory, "_rigid_limits", lambda: iter(()))
+    assert memory_limit(None) == (10.0, "free")
+    assert memory_limit(1000) == (1000, "what --max-memory allows")
+    monkeypatch.setattr(memory, "_rigid_limits", lambda: iter([MemoryLimit(100.0, "shell")]))
+    assert memory_limit(1000) == (100.0, "shell")
+    assert memory_limit(50) == (50, "what --max-memory allows")
 
 
 def test_control_groups_of_both_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

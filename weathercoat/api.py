@@ -12,6 +12,7 @@ from weathercoat.mesh.read import read_surface
 from weathercoat.mesh.remesh import RemeshParameters
 from weathercoat.mesh.remesh import remesh as remesh_surface
 from weathercoat.mesh.surface import Surface
+from weathercoat.output.folder import output_errors
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.pictures import PictureParameters, render_snapshot, write_png
 from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
@@ -70,18 +71,19 @@ def write(path: str | os.PathLike[str], content: Surface | Snapshot) -> None:
         write_mesh(path, content, overwrite=True)
         return
     kind = path.suffix.lower()
-    if kind == ".ply":
-        write_snapshot_ply(path.parent, content, path.stem)
-    elif kind == ".glb":
-        write_snapshot_glb(path, content)
-    elif kind == ".png":
-        write_png(path, render_snapshot(content, PictureParameters()))
-    else:
-        raise OutputError(
-            f"no format for a snapshot has the extension {kind!r}",
-            file=str(path),
-            remedy="use .ply, .glb or .png",
-        )
+    with output_errors(path):
+        if kind == ".ply":
+            write_snapshot_ply(path.parent, content, path.stem)
+        elif kind == ".glb":
+            write_snapshot_glb(path, content)
+        elif kind == ".png":
+            write_png(path, render_snapshot(content, PictureParameters()))
+        else:
+            raise OutputError(
+                f"no format for a snapshot has the extension {kind!r}",
+                file=str(path),
+                remedy="use .ply, .glb or .png",
+            )
 
 
 def verify(folder: str | os.PathLike[str]) -> Verification:

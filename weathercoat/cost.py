@@ -10,7 +10,8 @@ installation compiles for about a minute more, which is left out.
 Memory is that of the stage which needs most, each linear in the faces of the model (m), those of the film (n)
 and the pixels of a picture: the largest resident set of fresh processes, measured on 2026-11-22 by `python -m
 tests.measure_memory`, which prints what is measured beside what is predicted here. Neither the number of
-steps nor that of snapshots or threads matters; a picture needs less where film has fallen.
+steps nor that of snapshots or threads matters; a picture needs less where film has fallen. Compiling, in the
+first run after an installation, takes up to 130 MB more.
 """
 
 from __future__ import annotations
@@ -32,17 +33,19 @@ SECONDS_PER_SOLVED_FACE = 1.4e-4  # for the curl that has to be followed, in how
 SECONDS_PER_SNAPSHOT_FACE = 3.5e-6
 SECONDS_PER_PICTURE_PIXEL = 2.1e-6
 
-BYTES_AT_START = 165e6  # the interpreter, its libraries and compiled kernels
-BYTES_OF_SIMULATING = 25e6  # more of these
-BYTES_PER_MODEL_FACE = 160  # that stay
-BYTES_PER_FACE_READ = 260
-BYTES_PER_MODEL_FACE_REMESHED = 500
-BYTES_PER_REMESHED_FACE = 1330
-BYTES_PER_SIMULATED_FACE = 1070
-BYTES_PER_SOLVED_FACE = 980  # more, of solvers that converge
-BYTES_PER_WRITTEN_FACE = {"ply": 220, "glb": 440}  # more than simulated
-BYTES_PER_DRAWN_FACE = 720  # more than simulated
-BYTES_PER_PICTURE_PIXEL = 270
+BYTES_AT_START = 180e6  # the interpreter, its libraries and compiled kernels
+BYTES_OF_REMESHING = 50e6  # more of these
+BYTES_OF_SIMULATING = 30e6
+BYTES_OF_DRAWING = 30e6
+BYTES_PER_MODEL_FACE = 165  # that stay
+BYTES_PER_FACE_READ = 270
+BYTES_PER_MODEL_FACE_REMESHED = 525
+BYTES_PER_REMESHED_FACE = 1400
+BYTES_PER_SIMULATED_FACE = 1120
+BYTES_PER_SOLVED_FACE = 1030  # more, of solvers that converge
+BYTES_PER_WRITTEN_FACE = {"ply": 230, "glb": 460}  # more than simulated
+BYTES_PER_DRAWN_FACE = 750  # more than simulated
+BYTES_PER_PICTURE_PIXEL = 280
 BYTES_PER_BYTE_READ = {"obj": 6, "ply": 9, "stl": 6, "glb": 11, "gltf": 11, "off": 6}
 BYTES_PER_BYTE_READ_OF_OTHERS = 10
 _ROUND_NUMBERS = [digits * 10**power for power in range(2, 7) for digits in range(10, 100)]
@@ -81,6 +84,8 @@ def estimate_cost(config: Config, model_faces: int) -> Cost:
 def _memory_by_stage(config: Config, model_faces: int, faces: int) -> dict[str, float]:
     """Bytes at the peak of each stage."""
     model = BYTES_AT_START + model_faces * BYTES_PER_MODEL_FACE
+    if config.remesh:
+        model += BYTES_OF_REMESHING
     simulated = model + BYTES_OF_SIMULATING + faces * BYTES_PER_SIMULATED_FACE
     solver = BYTES_PER_SOLVED_FACE if config.deformation.solver in ("newton", "descent") else 0
     stages = {
@@ -89,12 +94,16 @@ def _memory_by_stage(config: Config, model_faces: int, faces: int) -> dict[str, 
         "writing": simulated + faces * max(BYTES_PER_WRITTEN_FACE[name] for name in config.output.formats),
     }
     if config.remesh:
-        new = faces * BYTES_PER_REMESHED_FACE
-        stages["remeshing"] = model + max(model_faces * BYTES_PER_MODEL_FACE_REMESHED, new)
+        stages["remeshing"] = _memory_to_remesh(model_faces, faces)
     if config.output.preview:
         drawn = faces * BYTES_PER_DRAWN_FACE + _pixels(config) * BYTES_PER_PICTURE_PIXEL
-        stages["pictures"] = simulated + drawn
+        stages["pictures"] = simulated + BYTES_OF_DRAWING + drawn
     return stages
+
+
+def _memory_to_remesh(model_faces: int, faces: int) -> float:
+    model = BYTES_AT_START + BYTES_OF_REMESHING + model_faces * BYTES_PER_MODEL_FACE
+    return model + max(model_faces * BYTES_PER_MODEL_FACE_REMESHED, faces * BYTES_PER_REMESHED_FACE)
 
 
 def _pixels(config: Config) -> int:
@@ -115,7 +124,18 @@ def require_memory_to_read(model: Path, limit: MemoryLimit | None) -> None:
             f"a file of {in_megabytes(size)} needs about {in_megabytes(needed)} of memory to be read, more "
             f"than {in_megabytes(limit.bytes)}, {limit.origin}",
             file=str(model),
-            remedy="export the model with fewer faces, or allow more with --max-memory",
+            remedy="export the model with fewer faces, or allow more memory",
+        )
+
+
+def require_memory_to_remesh(model_faces: int, faces: int, limit: MemoryLimit | None) -> None:
+    """Raise LimitError where making so many faces of a model needs more than a limit."""
+    needed = _memory_to_remesh(model_faces, faces)
+    if limit is not None and needed > limit.bytes:
+        raise LimitError(
+            f"remeshing needs about {in_megabytes(needed)} of memory, more than {in_megabytes(limit.bytes)}, "
+            f"{limit.origin}",
+            remedy="ask for fewer faces, or simplify the model first",
         )
 
 
@@ -134,10 +154,10 @@ def what_fits(config: Config, model_faces: int, limit: MemoryLimit) -> str:
     """What to ask for instead of a run that needs more than a limit."""
     faces = faces_that_fit(config, model_faces, limit.bytes)
     if faces:
-        return f"remesh.faces={faces} would fit, or allow more with --max-memory"
+        return f"remesh.faces={faces} would fit, or allow more memory"
     if config.output.preview and estimate_cost(config, model_faces).stage == "pictures":
-        return "ask for smaller pictures (output.picture_width), or allow more with --max-memory"
-    return "simplify the model first, or allow more with --max-memory"
+        return "ask for smaller pictures (output.picture_width), or allow more memory"
+    return "simplify the model first, or allow more memory"
 
 
 def faces_that_fit(config: Config, model_faces: int, limit: float) -> int:

@@ -47,8 +47,10 @@ def parse_size(text: str) -> int:
 
 
 def memory_limit(wanted: int | None) -> MemoryLimit | None:
-    """The limit that is wanted, in bytes, or that of this process."""
-    return usable_memory() if wanted is None else MemoryLimit(wanted, "what --max-memory allows")
+    """The limit that is wanted, in bytes, instead of that of this process; but those of the shell hold."""
+    if wanted is None:
+        return usable_memory()
+    return min([MemoryLimit(wanted, "what --max-memory allows"), *_rigid_limits()])
 
 
 def usable_memory() -> MemoryLimit | None:
@@ -70,11 +72,11 @@ def _soft_limits() -> Iterator[MemoryLimit]:
     own = _status("VmRSS")
     free = _meminfo("MemAvailable")
     if free is not None:
-        yield MemoryLimit(free + own, "the memory that is free")
+        yield MemoryLimit(free + own, "the memory that is free (unless --max-memory says otherwise)")
     elif hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
         yield MemoryLimit(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), "the machine's memory")
     for limit in _control_groups():
-        yield MemoryLimit(limit, "the limit of the control group")
+        yield MemoryLimit(limit, "the limit of the control group (unless --max-memory says otherwise)")
 
 
 def _rigid_limits() -> Iterator[MemoryLimit]:

@@ -49,10 +49,14 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
         ),
         (CheckError("flipped", remedy="none"), 6, "E-CHECK: flipped; none"),
         (click.UsageError("no such thing."), 2, "E-USAGE: no such thing; see `weathercoat fail --help`"),
-        (
-            MemoryError(),
-            5,
-            "E-LIMIT: out of memory; ask for fewer faces, or use a machine with more memory",
+        *(
+            (error, 5, "E-LIMIT: out of memory; ask for fewer faces, or use a machine with more memory")
+            for error in (
+                MemoryError(),
+                OSError(errno.ENOMEM, "Cannot allocate memory"),
+                RuntimeError("can't start new thread"),
+                ImportError("libgfortran.so.5: failed to map segment from shared object"),
+            )
         ),
         (
             OSError(errno.ENOSPC, "No space left on device", "x.ply"),

@@ -8,10 +8,12 @@ import sys
 from typing import NoReturn
 
 from weathercoat.cli.signals import Stopped, raise_signals
+from weathercoat.cli.streams import open_standard_streams
 
 
 def main() -> NoReturn:
     """The entry point: run the command line of this process and exit."""
+    open_standard_streams()
     raise_signals()
     # No result depends on BLAS; its threads would reserve memory for every core, and where they get none,
     # raise SIGINT.

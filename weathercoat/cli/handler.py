@@ -73,13 +73,26 @@ def _as_weathercoat_error(error: Exception) -> WeathercoatError:
         path = context.command_path if context else PROGRAM
         message = error.format_message().rstrip(".").replace(". Did", "; did")
         return UsageError(message, remedy=f"see `{path} --help`")
-    if isinstance(error, MemoryError):
+    if _is_lack_of_memory(error):
         return LimitError("out of memory", remedy="ask for fewer faces, or use a machine with more memory")
     if isinstance(error, OSError) and error.errno in _DEVICE_ERRORS:
-        return OutputError(str(error.strerror), file=str(error.filename or "standard output"))
+        if error.filename is None:
+            remedy = "make room, or send it elsewhere"
+            return OutputError(str(error.strerror), file="standard output", remedy=remedy)
+        return OutputError(str(error.strerror), file=str(error.filename))
     summary = " ".join(f"{type(error).__name__}: {error}".split())
     return WeathercoatError(
         f"internal error, {summary}", remedy="report it with the traceback that --debug prints"
+    )
+
+
+def _is_lack_of_memory(error: Exception) -> bool:
+    """Whether memory has run out, in the words of whoever noticed: Python, a thread, or the loader."""
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
+    words = {RuntimeError: "can't start new thread", ImportError: "failed to map segment"}
+    return isinstance(error, MemoryError) or any(
+        isinstance(error, kind) and text in str(error) for kind, text in words.items()
     )
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -29,14 +31,8 @@ class Messages:
 
     def __enter__(self) -> Messages:
         if self._log_file is not None:
-            try:
+            with self._log_errors():
                 self._log = self._log_file.open("w", encoding="utf-8")
-            except OSError as error:
-                raise OutputError(
-                    f"the log cannot be written: {error.strerror}",
-                    file=str(self._log_file),
-                    remedy="choose another file",
-                ) from error
         return self
 
     def __exit__(
@@ -51,8 +47,10 @@ class Messages:
                     if isinstance(error, WeathercoatError)
                     else [f"{type(error).__name__}: {error}".removesuffix(": ")]
                 )
-                self._write(*lines)
-            self._log.close()
+                with contextlib.suppress(OutputError):  # the error itself is what counts
+                    self._write(*lines)
+            with contextlib.suppress(OSError):  # what could not be written has been reported
+                self._log.close()
 
     def log(self, text: str) -> None:
         """Say one line."""
@@ -76,5 +74,17 @@ class Messages:
 
     def _write(self, *lines: str) -> None:
         now = time.strftime("%Y-%m-%d %H:%M:%S")
-        self._log.writelines(f"{now} {line}\n" for line in lines)
-        self._log.flush()
+        with self._log_errors():
+            self._log.writelines(f"{now} {line}\n" for line in lines)
+            self._log.flush()
+
+    @contextlib.contextmanager
+    def _log_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OutputError(
+                f"the log cannot be written: {error.strerror}",
+                file=str(self._log_file),
+                remedy="choose another file",
+            ) from error

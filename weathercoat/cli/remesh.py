@@ -51,6 +51,8 @@ def command(
     """
     from weathercoat.cli.messages import Messages
     from weathercoat.cli.reading import read_model
+    from weathercoat.cost import require_memory_to_remesh
+    from weathercoat.memory import usable_memory
     from weathercoat.mesh.remesh import RemeshParameters, remesh
     from weathercoat.output.report import measure_surface
     from weathercoat.run import name_errors, report_compiling, report_notes
@@ -65,6 +67,7 @@ def command(
     ):
         surface = read_model(model, model_format)
         report_notes(surface.notes, model, messages.log)
+        require_memory_to_remesh(len(surface.faces), faces, usable_memory())
         result = remesh(surface, RemeshParameters(faces=faces, crease_angle=crease_angle, seed=seed))
         report_notes(result.notes[len(surface.notes) :], model, messages.log)
         written = write(result)

@@ -79,7 +79,7 @@ class RunFolder:
     def __enter__(self) -> Path:
         self._lock = FolderLock(self.path)
         try:
-            with _output_errors(self.target):
+            with output_errors(self.target):
                 if self.path.is_dir() and not (self.path / LOCK).exists() and any(self.path.iterdir()):
                     reason = f"{self.path.name} is in the way"
                     raise OutputError(reason, file=str(self.target), remedy="move it")
@@ -127,7 +127,7 @@ class RunFolder:
 
     def clear(self) -> None:
         """Empty the working folder."""
-        with _output_errors(self.target):
+        with output_errors(self.target):
             for entry in self.path.iterdir():
                 if entry.is_dir() and not entry.is_symlink():
                     shutil.rmtree(entry)
@@ -141,7 +141,7 @@ class RunFolder:
             raise OutputError("is a file, not a folder", file=str(self.target))
         if not (self.overwrite or self.resume):
             raise OutputExistsError("the folder exists", file=str(self.target))
-        with _output_errors(self.target):
+        with output_errors(self.target):
             is_run = (self.target / self.marker).is_file() or not any(self.target.iterdir())
         if not is_run:
             raise OutputError(
@@ -172,7 +172,7 @@ class RunFolder:
     def _put_in_place(self) -> None:
         """Rename the whole folder to the target; what was there goes only once the new one is in place."""
         self._check_target()
-        with _output_errors(self.target):
+        with output_errors(self.target):
             (self.path / LOCK).unlink()
             if not self.target.is_dir():
                 self.path.rename(self.target)
@@ -206,7 +206,7 @@ def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[Binar
     if path.is_dir():
         raise OutputError("is a folder", file=str(path), remedy="give the name of a file")
     if os.path.lexists(path) and not path.is_file():
-        with _output_errors(path), path.open("wb") as stream:
+        with output_errors(path), path.open("wb") as stream:
             yield stream
         return
     if path.is_file() and not overwrite:
@@ -220,7 +220,7 @@ def whole_file(target: Path | str, *, overwrite: bool = False) -> Iterator[Binar
 
     unfinished.begin(give_up)
     try:
-        with _output_errors(path):
+        with output_errors(path):
             with aside.open("xb") as stream:
                 yield stream
             aside.replace(path)
@@ -308,7 +308,8 @@ def _aside(target: Path) -> Path:
 
 
 @contextlib.contextmanager
-def _output_errors(target: Path) -> Iterator[None]:
+def output_errors(target: Path) -> Iterator[None]:
+    """OSErrors of the block as OutputError of the target."""
     try:
         yield
     except OSError as error:

@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.errors import CorruptError, OutputError
+from weathercoat.errors import CorruptError
 from weathercoat.mesh.surface import Surface, Vectors, vertex_normals
 from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
@@ -283,15 +283,12 @@ def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int |
 
 
 def write_png(target: Path | BinaryIO, image: Image, *, compression: int = 6) -> None:
-    """Write an image (h, w, 3) uint8 as PNG, compressed from 0 to 9; `OutputError` if the target cannot be
+    """Write an image (h, w, 3) uint8 as PNG, compressed from 0 to 9; OSError if the target cannot be
     written.
     """
     from PIL import Image as Pillow
 
-    try:
-        Pillow.fromarray(image).save(target, format="PNG", compress_level=compression)
-    except OSError as error:
-        raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
+    Pillow.fromarray(image).save(target, format="PNG", compress_level=compression)
 
 
 def read_png(path: Path) -> Image:
