@@ -34,7 +34,7 @@ SECONDS_PER_SNAPSHOT_FACE = 3.5e-6
 SECONDS_PER_PICTURE_PIXEL = 2.1e-6
 
 BYTES_AT_START = 180e6  # the interpreter, its libraries and compiled kernels
-BYTES_OF_REMESHING = 50e6  # more of these
+BYTES_OF_REMESHING = 30e6  # more of these
 BYTES_OF_SIMULATING = 30e6
 BYTES_OF_DRAWING = 30e6
 BYTES_PER_MODEL_FACE = 165  # that stay
