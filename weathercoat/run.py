@@ -107,7 +107,7 @@ def run_asset(
     say = log or (lambda line: None)
     watch = Stopwatch()
     run_folder = RunFolder(out, overwrite=overwrite, resume=resume)
-    with report_compiling(say), note_what_is_kept(run_folder), run_folder as folder:
+    with report_compiling(say), _note_what_is_kept(run_folder), run_folder as folder:
         with watch.time("read"):
             intake = _take_in(loaded, model, format, say, memory_limit(max_memory), strict=strict)
         config = intake.plan.loaded.config
@@ -143,18 +143,7 @@ def run_asset(
         if config.output.preview:
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
-        report = make_report(
-            config=config.as_dict(),
-            seed=config.seed,
-            inputs=intake.inputs,
-            meshes={"input": measure_surface(intake.surface), "film": measure_surface(simulation.surface)},
-            notes=meshed.notes,
-            quality=intake.plan.quality,
-            stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
-            solver=asdict(simulation.solving),
-            snapshots=recorder.figures,
-            files=manifest(folder),
-        )
+        report = _report(intake, meshed.notes, simulation, recorder, folder)
         write_json(folder / REPORT, report)
         if check:
             with watch.time("check"), name_errors(intake.name):
@@ -196,8 +185,31 @@ def _mesh(intake: _Intake, checkpoint: Checkpoint | None, folder: Path) -> Surfa
     return remesh_painted(intake.painted, config)
 
 
+def _report(
+    intake: _Intake,
+    notes: Sequence[Note],
+    simulation: Simulation,
+    recorder: SnapshotRecorder,
+    folder: Path,
+) -> dict[str, Any]:
+    """The content of `run.json` for a simulation at its end, with all other files in the folder."""
+    config = intake.plan.loaded.config
+    return make_report(
+        config=config.as_dict(),
+        seed=config.seed,
+        inputs=intake.inputs,
+        meshes={"input": measure_surface(intake.surface), "film": measure_surface(simulation.surface)},
+        notes=notes,
+        quality=intake.plan.quality,
+        stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
+        solver=asdict(simulation.solving),
+        snapshots=recorder.figures,
+        files=manifest(folder),
+    )
+
+
 @contextmanager
-def note_what_is_kept(run_folder: RunFolder) -> Iterator[None]:
+def _note_what_is_kept(run_folder: RunFolder) -> Iterator[None]:
     """Note on whatever ends the run early where its work is kept, if there is any to go on from."""
     try:
         yield
