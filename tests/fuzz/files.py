@@ -11,15 +11,15 @@ import argparse
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from tests.fuzz import strict
 from tests.fuzz.mutations import mutate
-from tests.fuzz.seeds import Seed, make_seeds, real_seeds
+from tests.fuzz.seeds import Seed, foreign_seeds, make_seeds, real_seeds
 from tests.fuzz.workers import Verdict, Worker
 from weathercoat.errors import WeathercoatError
 from weathercoat.mesh import topology
@@ -28,6 +28,7 @@ from weathercoat.mesh.surface import Surface
 
 _EXIT_CODES = (3, 4, 5)
 _REAL_SHARE = 0.25  # of the cases, where there are real files
+_FOREIGN_SHARE = 0.01  # of what meshio reads, in a process of its own that takes half a second
 Case = tuple[str, bytes]  # extension, content
 
 
@@ -36,13 +37,19 @@ class Sources:
     """The seeds: those of every checkout, and real files where there are any."""
 
     own: list[Seed]
-    real: list[Seed]
+    real: list[Seed] = field(default_factory=list)
+    foreign: list[Seed] = field(default_factory=foreign_seeds)
 
 
 def make_case(sources: Sources, seed: int, number: int) -> Case:
     """The damaged file of this number; the same for the same sources and `seed`."""
     random = np.random.default_rng([seed, number])
-    seeds = sources.real if sources.real and random.random() < _REAL_SHARE else sources.own
+    share = random.random()
+    seeds = sources.own
+    if share < _FOREIGN_SHARE:
+        seeds = sources.foreign
+    elif sources.real and share < _FOREIGN_SHARE + _REAL_SHARE:
+        seeds = sources.real
     source = seeds[int(random.integers(len(seeds)))]
     return source.extension, mutate(source, random)
 
@@ -112,11 +119,16 @@ def _contradiction(surface: Surface, data: bytes) -> str | None:
 
 
 def run(
-    sources: Sources, count: int | None, seed: int, *, seconds: float | None = None
-) -> tuple[Counter[str], list[tuple[int, Case, Verdict]]]:
-    """Judge `count` cases, or as many as `seconds` allow: how often each outcome, and the violations."""
+    sources: Sources,
+    count: int | None,
+    seed: int,
+    found: Callable[[int, Case, Verdict], None],
+    *,
+    seconds: float | None = None,
+) -> Counter[str]:
+    """Judge `count` cases, or as many as `seconds` allow, and tell `found` of each violation; how often each
+    outcome."""
     outcomes: Counter[str] = Counter()
-    violations = []
     end = None if seconds is None else time.monotonic() + seconds
     first = sources.own[0]
     with Worker(judge, (first.extension, first.data)) as worker:
@@ -127,8 +139,8 @@ def run(
             verdict = worker.judge(case)
             outcomes[f"{verdict.kind} {verdict.what}" if verdict.kind != "violation" else "violation"] += 1
             if verdict.kind == "violation":
-                violations.append((number, case, verdict))
-    return outcomes, violations
+                found(number, case, verdict)
+    return outcomes
 
 
 def _numbers(count: int | None) -> Iterator[int]:
@@ -160,14 +172,17 @@ def main(arguments: list[str]) -> int:
     if options.count is None and options.seconds is None:
         parser.error("give --count or --seconds")
     start = time.monotonic()
-    outcomes, violations = run(sources, options.count, options.seed, seconds=options.seconds)
-    for number, case, verdict in violations:
-        print(f"{_write(options.output, options.seed, number, case)}: {verdict.what}")
+
+    def report(number: int, case: Case, verdict: Verdict) -> None:
+        path = _write(options.output, options.seed, number, case)
+        print(f"{path}: {verdict.what}", flush=True)
+
+    outcomes = run(sources, options.count, options.seed, report, seconds=options.seconds)
     seeds = f"{len(sources.own)} + {len(sources.real)} seeds"
     print(f"{outcomes.total()} files from {seeds} in {time.monotonic() - start:.0f} s")
     for outcome, times in sorted(outcomes.items()):
         print(f"{times:8d} {outcome}")
-    return len(violations)
+    return outcomes["violation"]
 
 
 def _write(folder: Path, seed: int, number: int, case: Case) -> Path:

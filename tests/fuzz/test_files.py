@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import files
-from tests.fuzz.seeds import make_seeds, real_seeds
+from tests.fuzz.seeds import foreign_seeds, make_seeds, real_seeds
 from tests.fuzz.workers import Verdict, Worker
 
 COUNT = 900
@@ -18,30 +18,32 @@ COUNT = 900
 
 def test_damaged_files_are_refused_or_come_in_whole() -> None:
     """The same files everywhere: those of every checkout, and a count, not a time."""
-    outcomes, violations = files.run(files.Sources(make_seeds(), []), COUNT, seed=20)
-    assert [(number, verdict.what) for number, _, verdict in violations] == []
+    found: list[object] = []
+    outcomes = files.run(files.Sources(make_seeds()), COUNT, 20, lambda *violation: found.append(violation))
+    assert found == []
     accepted = sum(times for outcome, times in outcomes.items() if outcome.startswith("accepted"))
     assert COUNT / 10 < accepted < COUNT / 2
 
 
 def test_the_files_themselves_come_in() -> None:
-    for seed in make_seeds():
+    for seed in [*make_seeds(), *foreign_seeds()]:
         assert files.judge((seed.extension, seed.data)).kind == "accepted", seed.name
 
 
 def test_cases_depend_on_seed_and_number_alone() -> None:
-    sources = files.Sources(make_seeds(), [])
+    sources = files.Sources(make_seeds())
     one = [files.make_case(sources, 3, number) for number in range(50)]
-    assert one == [files.make_case(files.Sources(make_seeds(), []), 3, number) for number in range(50)]
+    assert one == [files.make_case(files.Sources(make_seeds()), 3, number) for number in range(50)]
     assert one != [files.make_case(sources, 4, number) for number in range(50)]
 
 
 @pytest.mark.long
 def test_damaged_real_files(meshes_folder: Path) -> None:
-    sources = files.Sources(real_seeds(), [])
+    sources = files.Sources(real_seeds())
     assert len(sources.own) > 40
-    _, violations = files.run(sources, 2000, seed=1)
-    assert [(number, verdict.what) for number, _, verdict in violations] == []
+    found: list[object] = []
+    files.run(sources, 2000, 1, lambda *violation: found.append(violation))
+    assert found == []
 
 
 def misbehave(how: str) -> Verdict:

@@ -293,6 +293,8 @@ def _ply() -> Iterator[OddFile]:
     )
     yield odd("two_rows_a_line", text.replace("0 0 0\n", "0 0 0 ", 1), code="E-CORRUPT", says="line 10")
     yield odd("row_over_two_lines", text.replace("0 0 1\n", "0 0\n1\n", 1), code="E-CORRUPT", says="line 11")
+    yield odd("faces_on_a_line", text.replace("\n4 ", " 4 "), code="E-CORRUPT", says="line 17")
+    yield odd("last_rows_joined", text.replace("\n4 1", " 4 1"), code="E-CORRUPT", says="holds 5 lines")
     yield odd("blank_lines", text.replace("\n4 ", "\n\n4 "))
     yield odd("row_swallowed", text.replace("4 0 1 3 2\n4", "5 0 1 3 2\n3"), code="E-CORRUPT")
     yield odd("faces_of_none", text.replace("face 6", "face 7") + "0\n", notes=("W-DEGENERATE",))

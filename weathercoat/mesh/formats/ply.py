@@ -173,6 +173,11 @@ def _read_ascii(body: bytes, elements: list[Element], first_line: int) -> dict[s
             words += column.sizes + column.is_list
             if declared.type[0] in "iu":
                 column.values = _whole_numbers(column.values.astype(np.float64), element, declared)
+        if len(filled) < element.count:
+            raise CorruptError(
+                f"the header says {element.count} rows of element {element.name}, "
+                f"the file holds {len(filled)} lines of them"
+            )
         wrong = np.flatnonzero(lines.fields[filled[: element.count]] != words)
         if len(wrong):
             line = filled[wrong[0]]
