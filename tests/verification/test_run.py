@@ -426,6 +426,27 @@ def test_files_that_are_missing_or_strange_are_found(run: Path) -> None:
     }
 
 
+@pytest.mark.parametrize(
+    ("step", "age", "told"),
+    [
+        (20, 0.4, "the age of step 20 is 0.4, which is"),
+        (70, 0.5, "are not among"),
+        (10**400, 0.5, "of no such step"),
+        (10, 0.5, "do not rise"),
+    ],
+)
+def test_steps_and_ages_follow_the_config(run: Path, step: int, age: float, told: str) -> None:
+    report = edit_report(run)
+    report["snapshots"][0 if step == 20 else 1].update(step=step, age=age)
+    write_report(run, report)
+    assert any(told in str(finding) for finding in verify_run(run).findings)
+
+
+def test_a_run_so_short_that_its_ages_have_no_digits_is_whole(tmp_path: Path) -> None:
+    overrides = (*SMALL, "ageing.duration=5e-324", "output.formats=[ply]")
+    assert verify_run(make_run(tmp_path / "run", make_sign(), "crackle", *overrides)).findings == ()
+
+
 def test_a_snapshot_of_no_row_is_found(run: Path) -> None:
     shutil.copy(run / f"{LAST}.ply", run / "snapshots" / "step_0070.ply")
     seal(run)

@@ -31,6 +31,7 @@ from weathercoat.verification.sheets import check_agreement, check_glb
 
 _PREVIEW, _UNTOUCHED = "preview.png", "untouched.ply"
 _REPORT_VERSION = 1
+_TINY = float(np.finfo(np.float64).tiny)  # below it, an age has no digits left to compare
 _Result = TypeVar("_Result")
 
 
@@ -107,12 +108,17 @@ class _Run:
         self.report, self.listing, self.ledger = report, listing, ledger
         self.rows = take(report, "snapshots", list)
         self.steps = [take(row, "step", int) for row in self.rows]
-        self.ages = [take(row, "age", float) for row in self.rows]
         self.formats = take(report, "config.output.formats", list)
         if not self.formats or not all(name in ("ply", "glb") for name in self.formats):
             raise BrokenFileError(f"config.output.formats is {str(self.formats)[:40]}")
         self.has_preview = take(report, "config.output.preview", bool)
-        self.width = max(4, len(str(take(report, "config.ageing.steps", int))))
+        self.duration = take(report, "config.ageing.duration", float)
+        self.last_step = take(report, "config.ageing.steps", int)
+        if self.last_step < 1 or not all(map(is_number, (self.last_step, *self.steps))):
+            raise BrokenFileError(
+                f"config.ageing.steps is {self.last_step}, or a snapshot is of no such step"
+            )
+        self.width = max(4, len(str(self.last_step)))
         self.metal_faces = take(report, "meshes.film.faces", int)
         # In sizes of the painted surface, which is no larger than the input.
         size = np.sqrt(max(take(report, "meshes.input.area", float), take(report, "meshes.film.area", float)))
@@ -153,8 +159,8 @@ class _Run:
         self.ledger.expect(
             "order",
             REPORT,
-            all(a < b for a, b in pairwise(self.ages)),
-            f"the ages {', '.join(map(str, self.ages))[:60]} do not rise",
+            all(0 <= step <= self.last_step for step in self.steps),
+            f"the steps {', '.join(map(str, self.steps))[:60]} are not among {self.last_step:,} of the run",
         )
         for row, step in zip(self.rows, self.steps, strict=True):
             self._check_snapshot(row, step)
@@ -187,7 +193,7 @@ class _Run:
 
     def _check_snapshot(self, row: dict[str, Any], step: int) -> None:
         """The row of the report and the files of one snapshot."""
-        has_figures = self._guard("figures", REPORT, lambda: check_row(self.ledger, row)) is not None
+        has_figures = self._guard("figures", REPORT, lambda: self._check_row(row, step)) is not None
         snapshot: PlySnapshot | None = None
         film: Film | None = None
         if "ply" in self.formats:
@@ -207,6 +213,17 @@ class _Run:
             if glb is not None:
                 self._guard("glb", REPORT, lambda: self._check_glb(name, glb, row, snapshot, film))
         self.snapshots += 1
+
+    def _check_row(self, row: dict[str, Any], step: int) -> bool:
+        """What a row of the report says by itself; true, or BrokenFileError where something is missing."""
+        told, own = take(row, "age", float), self.duration * (step / self.last_step)
+        self.ledger.expect(
+            "ages",
+            REPORT,
+            abs(told - own) <= REPORTED * own + _TINY,
+            f"the age of step {step} is {told!r}, which is not that share of {self.duration!r}",
+        )
+        return check_row(self.ledger, row)
 
     def _check_ply(self, name: str, snapshot: PlySnapshot, row: dict[str, Any]) -> Film | None:
         """The film of a snapshot, or None where it is too broken to go on."""
