@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.checked import COMPILED, checked_kernel
 from weathercoat import compile as compiling
@@ -13,6 +14,17 @@ from weathercoat import compile as compiling
 if not COMPILED:
     # before any other module of the package declares its kernels
     compiling.kernel = checked_kernel
+
+
+# The same examples every time; where long tests run, more of them.
+settings.register_profile("default", derandomize=True, deadline=None)
+settings.register_profile("long", derandomize=True, deadline=None, max_examples=1000)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how many examples property tests try that do not say so themselves."""
+    chosen = config.getoption("markexpr", "")
+    settings.load_profile("long" if "long" in chosen.replace("not long", "") else "default")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
