@@ -82,6 +82,7 @@ def test_nothing_given_is_an_empty_mapping(data: bytes) -> None:
         (b"a: 1\n---\nb: 2\n", 2, "document"),
         (b"a: !!python/object/apply:os.system [ls]\n", 1, "not supported"),
         (b"a: !!python/name:os.system x\n", 1, "cannot be read"),
+        (b"a: !!null x\n", 1, "cannot be read"),
         (b"a: &x [*x]\n", 1, "contains itself"),
         (b"a: *nowhere\n", 1, "undefined alias"),
         (b"? [1, 2]\n: 3\n", 1, "a key must be a word"),

@@ -70,12 +70,13 @@ _CONFIGS = (
     "x" * 300,
 )
 _MODELS = ("m.obj", "nowhere.obj", "", ".", "m.obj/x", "x" * 300)
+_FOLDERS = ("out", "", ".", "m.obj", "no/where", "x" * 300)
 _COMMANDS: tuple[tuple[str, ...], ...] = (
     ("config", "check", "CONFIG"), ("config", "check", "CONFIG", "CONFIG"), ("config", "show", "CONFIG"),
     ("config", "new", "OUT"), ("config", "list"), ("config", "schema"), ("config",), ("config", "none"),
     ("run", "CONFIG", "MODEL", "-o", "OUT", "--faces", "50", "--steps", "2"), ("run", "CONFIG"), ("run",),
-    ("inspect", "MODEL"), ("remesh", "MODEL", "-o", "OUT", "--faces", "50"), ("sample", "WORD"), ("WORD",),
-    (),
+    ("inspect", "MODEL"), ("verify", "FOLDER"), ("render", "FOLDER", "-o", "OUT"),
+    ("remesh", "MODEL", "-o", "OUT", "--faces", "50"), ("sample", "WORD"), ("WORD",), (),
 )  # fmt: skip
 _OPTIONS = (
     "--json", "--quiet", "-q", "--strict", "--overwrite", "--help", "--version", "--markdown", "--no-such",
@@ -102,6 +103,7 @@ def _spelled(word: str, random: Random) -> str:
         "CONFIG": _CONFIGS,
         "MODEL": _MODELS,
         "OUT": ("out.ply", "out", "", ".", "no/where", "/"),
+        "FOLDER": _FOLDERS,
         "WORD": short,
     }
     if "ASSIGNMENT" in word:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,7 +57,7 @@ def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
     from weathercoat.output.pictures import contact_sheet, frame_camera, render_snapshot
     from weathercoat.recording import picture_parameters
 
-    if not (run / REPORT).exists() and (run.parent / REPORT).exists():
+    if not os.path.exists(run / REPORT) and os.path.exists(run.parent / REPORT):  # noqa: PTH110 (any text)
         run = run.parent
     report, snapshots = read_run(run)
     if step is not None:

@@ -144,7 +144,7 @@ class _Reader:
         kind, text = node.tag.removeprefix(_TAG), node.value
         if kind == "str":
             return text
-        if kind == "null":
+        if kind == "null" and text.lower() in ("", "~", "null"):
             return None
         if kind == "bool" and text.lower() in ("true", "false"):
             return text.lower() == "true"

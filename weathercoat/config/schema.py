@@ -198,7 +198,7 @@ class Ageing(Section):
     steps: Whole = parameter(
         1000, "Number of steps that the run is divided into", symbol="N", ge=1, le=10_000_000
     )
-    duration: Real = parameter(1.0, "Age that the run covers", unit="ages", gt=0, le=1000)
+    duration: Real = parameter(1.0, "Age that the run covers", unit="ages", ge=1e-9, le=1000)
 
 
 class Tension(Section):

@@ -257,7 +257,7 @@ def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
     from weathercoat.output.snapshots import read_snapshot_ply
 
     folder = Path(path)
-    if not folder.is_dir():
+    if not os.path.isdir(folder):  # noqa: PTH112 (any text will do)
         raise AccessError(
             "there is no such folder", file=str(folder), remedy="give the folder of a finished run"
         )
