@@ -21,6 +21,7 @@ def test_damaged_files_are_refused_or_come_in_whole() -> None:
     found: list[object] = []
     outcomes = files.run(files.Sources(make_seeds()), COUNT, 20, lambda *violation: found.append(violation))
     assert found == []
+    assert any(f"accepted {seed.extension}" in outcomes for seed in foreign_seeds())
     accepted = sum(times for outcome, times in outcomes.items() if outcome.startswith("accepted"))
     assert COUNT / 10 < accepted < COUNT / 2
 

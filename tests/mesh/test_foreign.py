@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -48,6 +49,16 @@ def test_no_other_file_is_opened(tmp_path: Path, name: str, text: str) -> None:
     secret.write_text("*NODE\n1,0,0,0\n")
     with pytest.raises(SecurityError, match=r"secret\.inp"):
         read_text(tmp_path, name, text.format(path=secret))
+
+
+def test_a_lower_limit_of_memory_stays(tmp_path: Path) -> None:
+    path = tmp_path / "a.vtk"
+    path.write_text(VTK)
+    child = Path(foreign.__file__).with_name("foreign_child.py")
+    limited = "import resource as r, runpy; r.setrlimit(r.RLIMIT_AS, (1 << 31, 1 << 31)); "
+    limited += f"import sys; sys.argv = ['', {str(path)!r}, {str(tmp_path / 'result.npz')!r}]; "
+    limited += f"runpy.run_path({str(child)!r}, run_name='__main__')"
+    assert subprocess.run([sys.executable, "-c", limited], check=False).returncode == 0
 
 
 @pytest.mark.parametrize("count", [5 * 10**8, 10**12])

@@ -63,7 +63,9 @@ def limit_memory(size: int) -> None:
     except (ImportError, OSError):
         return
     limit = now + SPARE_BYTES + BYTES_PER_BYTE * size
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    if most == resource.RLIM_INFINITY or limit < most:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
 def main(model: Path, result: Path) -> int:
