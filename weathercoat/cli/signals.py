@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SECONDS_UNTIL_AGAIN = 0.02
 SECONDS_TO_LEAVE = 2.0
-SECONDS_OF_PATIENCE = 0.5
+SECONDS_OF_PATIENCE = 0.4  # and the watchdog has a little more
 
 
 class Stopped(BaseException):

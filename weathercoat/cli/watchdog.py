@@ -1,8 +1,9 @@
 """The last resort after a signal: a thread that ends the process where the main thread is not heard of.
 
 The exception of a signal is raised when the interpreter has its turn. Kernels run in slices, so that it has
-it several times a second; but a sort, a factorisation or a tree of boxes of millions of faces is one call of
-a library. Such calls let other threads run.
+it several times a second; but a sort or a factorisation for millions of faces is one call of a library. Such
+calls let other threads run. The one that does not is Embree's making of a scene: half a second of work for a
+million triangles, for which a signal waits.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from weathercoat.unfinished import clear_all
 if TYPE_CHECKING:
     from weathercoat.cli.signals import Stopped
 
-SECONDS_TO_BE_HEARD = 0.7
+SECONDS_TO_BE_HEARD = 0.55
 _SECONDS_BETWEEN_LOOKS = 0.02
 _SECONDS_FOR_THE_LINE = 0.1  # that standard error may take, since a pipe that nobody reads blocks
 
@@ -66,9 +67,8 @@ class Watchdog:
                     self._end(self._kinds[number])
 
     def _is_heard(self) -> bool:
-        for _ in range(round(SECONDS_TO_BE_HEARD / _SECONDS_BETWEEN_LOOKS)):
-            if self._is_answered:
-                return True
+        until = time.monotonic() + SECONDS_TO_BE_HEARD
+        while not self._is_answered and time.monotonic() < until:
             time.sleep(_SECONDS_BETWEEN_LOOKS)
         return self._is_answered
 
