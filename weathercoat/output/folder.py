@@ -90,12 +90,12 @@ class RunFolder:
                 if not self.overwrite:
                     self._check_interrupted()
                 self.clear()
+            unfinished.begin(self._give_up)
         except BaseException:
             self._lock.release(remove=not (self.path / CHECKPOINT_STATE).is_file())
             with contextlib.suppress(OSError):
                 self.path.rmdir()  # only if it is empty
             raise
-        unfinished.begin(self._give_up)
         return self.path
 
     def __exit__(
