@@ -18,7 +18,7 @@ help:
 	@echo "make demo      age a sign plate and say where to look"
 	@echo "make test      run the tests (make test-all: the long ones too)"
 	@echo "make coverage  run the core's tests without the JIT, and say what they reach"
-	@echo "make fuzz      read damaged files and configs for FUZZ_SECONDS=1200, from FUZZ_SEED (the date by default)"
+	@echo "make fuzz      damaged files and configs, runs at the bounds: for FUZZ_SECONDS=1200, from FUZZ_SEED (the date)"
 	@echo "make lint      style, types and import contracts"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
 	@echo "make bench     time it, and put the figures into the documentation"

@@ -18,7 +18,7 @@ if not COMPILED:
 
 # The same examples every time; where long tests run, more of them.
 settings.register_profile("default", derandomize=True, deadline=None)
-settings.register_profile("long", derandomize=True, deadline=None, max_examples=1000)
+settings.register_profile("long", derandomize=True, deadline=None, max_examples=300)
 
 
 def pytest_configure(config: pytest.Config) -> None:
