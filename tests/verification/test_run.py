@@ -326,6 +326,7 @@ def misdirect_sheet(ply: Ply) -> None:
         (set_glb(lambda d: d["asset"]["extras"].update(step=61)), "time", "is of step 61, age 1.0, but"),
         (set_glb(lambda d: d["nodes"][0]["translation"].pop()), "glb", "moved by no three numbers"),
         (set_glb(lambda d: d["nodes"][1].update(name="fim")), "glb-nodes", "its first nodes are"),
+        (set_glb(lambda d: d.update(buffers=[])), "glb", r"its buffer is not the [\d,]+ bytes of the binary"),
         (set_glb(lambda d: d.update(nodes=[])), "glb", "holds no nodes.0"),
         (set_glb(lambda d: d["meshes"][2].update(primitives=[])), "glb-counts", "have 0 faces instead of 1"),
         (set_sheet(nudge_sheet), "finite", "the position of vertex 1 is not finite"),

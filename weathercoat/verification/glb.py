@@ -53,7 +53,7 @@ def read_glb(content: bytes) -> Glb:
     document = read_object(text)
     if take(document, "asset.version", str) != "2.0":
         raise BrokenFileError("is no glTF 2.0")
-    if take(document, "buffers", list, []) and take(document, "buffers.0.byteLength", int) != len(binary):
+    if take(document, "buffers.0.byteLength", int, 0) != len(binary):
         raise BrokenFileError(f"its buffer is not the {len(binary):,} bytes of the binary chunk")
     root = take(document, f"scenes.{take(document, 'scene', int)}.nodes.0", int)
     model = take(document, f"nodes.{root}", dict)
