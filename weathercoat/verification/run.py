@@ -32,7 +32,6 @@ from weathercoat.verification.sheets import check_agreement, check_glb
 
 _PREVIEW, _UNTOUCHED = "preview.png", "untouched.ply"
 _REPORT_VERSION = 1
-_TINY = float(np.finfo(np.float64).tiny)  # below it, an age has no digits left to compare
 _Result = TypeVar("_Result")
 
 
@@ -221,7 +220,7 @@ class _Run:
         self.ledger.expect(
             "ages",
             REPORT,
-            abs(told - own) <= REPORTED * own + _TINY,
+            abs(told - own) <= REPORTED * own,
             f"the age of step {step} is {told!r}, which is not that share of {self.duration!r}",
         )
         return check_row(self.ledger, row)
