@@ -56,7 +56,7 @@ test-all: dev test-plain test-bounds
 # Kernels as plain Python with checked indices, measured; kernels that are compiled with checks. See docs/testing.md.
 CORE_TESTS := tests/film tests/deform tests/stain tests/mesh tests/sim tests/test_checked.py
 PLAIN_TESTS := tests/film tests/deform tests/stain $(addprefix tests/mesh/test_,$(addsuffix .py, \
-	buckets closest dihedral edits frame halfedge order pairing surface weld)) \
+	buckets dihedral frame halfedge order surface weld)) \
 	$(addprefix tests/sim/test_,recorders.py small_runs.py) tests/test_checked.py
 
 test-plain: dev

@@ -124,6 +124,7 @@ def test_the_minimum_is_the_same_from_flat_and_from_curled(solver: str) -> None:
     assert np.linalg.norm(gradient(elastic, ends[0])) < 1e-5 * first
 
 
+@pytest.mark.compiled
 @SOLVERS
 def test_no_step_raises_the_energy(solver: str) -> None:
     """Of any island, however few the iterations; and more iterations never end higher."""
@@ -136,6 +137,7 @@ def test_no_step_raises_the_energy(solver: str) -> None:
         before = after
 
 
+@pytest.mark.compiled
 def test_newton_converges_quadratically_where_targets_cannot_be_met() -> None:
     """Cracked film that wants to curl both ways: the gradient falls to round-off."""
     elastic, start = cracked_film(4)

@@ -301,6 +301,7 @@ def test_a_clamped_sheet_curls_to_a_cylinder() -> None:
     np.testing.assert_allclose(mesh.positions[: len(x)], bent, atol=1e-8)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("form", ["dihedral", "split", "arccos"])
 def test_attached_vertices_never_move_and_none_goes_below_the_metal(form: str) -> None:
     """A sphere with every third vertex attached: those bit for bit, others above their tangent planes."""

@@ -152,6 +152,7 @@ def test_the_film_between_attached_vertices_never_tears() -> None:
 # --- conservation ---
 
 
+@pytest.mark.compiled
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 10**6),

@@ -122,6 +122,7 @@ def test_hash_is_uniform() -> None:
     assert np.abs(counts - 1000).max() < 4.5 * np.sqrt(950)
 
 
+@pytest.mark.compiled
 def test_hash_of_neighbours_is_unrelated() -> None:
     """Points one quantum apart: correlation of 20,000 pairs within 4.5 / sqrt(20,000)."""
     points = points_of(20_000)

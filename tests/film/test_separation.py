@@ -122,6 +122,7 @@ def test_vertices_without_a_face_do_not_separate() -> None:
     assert separating(film, 1.0) == list(range(7))
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("rule", ["drying", "face"])
 @pytest.mark.parametrize("sums", ["plain", "per_valence"])
 def test_finds_whom_a_plain_evaluation_finds_while_the_film_moves(rule: str, sums: str) -> None:

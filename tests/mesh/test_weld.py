@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.checked import COMPILED
 from weathercoat.mesh.weld import SINGLE, first_at_place, weld
 
 
@@ -22,7 +23,7 @@ def weld_plainly(points: np.ndarray, part: np.ndarray) -> np.ndarray:
     return first
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80 if COMPILED else 8, deadline=None)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 60))
 def test_it_merges_what_the_plain_version_merges(seed: int, count: int) -> None:
     """Few places, some apart by about the tolerance, many points exactly alike, zeros of either sign."""

@@ -94,10 +94,9 @@ def test_many_small_tiles_are_swept_as_plainly(solver: str, monkeypatch: pytest.
 
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_flakes_take_all_area_with_them_that_is_lost(share: float) -> None:
-    """Literally, and with film that hangs by less than a share of its girth torn off; on both surfaces."""
-    for surface in (SHEET, BALL):
-        for film, curl in (({"flaking_hanging_share": share}, {}), (LITERAL_FILM, LITERAL_CURL)):
-            simulation = make_run(surface, steps=20, film=film, curl=curl)
-            finish(simulation)
-            assert_invariants(simulation)
-            assert simulation.flake_areas
+    """With film that hangs by less than a share of its girth torn off, and by the paper's rules."""
+    for film, curl in (({"flaking_hanging_share": share}, {}), (LITERAL_FILM, LITERAL_CURL)):
+        simulation = make_run(BALL if share else SHEET, steps=16, film=film, curl=curl)
+        finish(simulation)
+        assert_invariants(simulation)
+        assert simulation.flake_areas

@@ -47,7 +47,8 @@ def first_at_place(points: Points, part: Indices) -> NDArray[np.int32]:
     """For each of the points (n, 3), finite, the first with equal coordinates and `part` (n,); itself or one
     before."""
     first = np.empty(len(points), np.int32)
-    _match_places(points, part, first)
+    with np.errstate(over="ignore"):  # hashes wrap round
+        _match_places(points, part, first)
     return first
 
 
@@ -64,7 +65,8 @@ def _first_near(points: Points, part: Indices) -> Indices:
     even = (points - low) / np.where(step > 0, step, 1.0)
     lattice = np.where(is_far, even.astype(np.int64), np.where(points < 0, -bits, bits))
     first = np.empty(len(points), np.int64)
-    _merge_near(points, part, lattice, tolerance, first)
+    with np.errstate(over="ignore"):  # hashes wrap round
+        _merge_near(points, part, lattice, tolerance, first)
     return first
 
 
@@ -144,8 +146,8 @@ def _merge_near(points, part, lattice, tolerance, first):  # type: ignore[no-unt
 @kernel
 def _hash(part, a, b, c):  # type: ignore[no-untyped-def]
     """A number of 64 bits, the lower 32 well mixed, for a cell of a grid in a part."""
-    key = np.uint64(part) * np.uint64(0xD6E8FEB86659FD93)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(a) * np.uint64(0x9E3779B97F4A7C15)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9)
-    key = (key ^ (key >> np.uint64(29))) + np.uint64(c) * np.uint64(0x94D049BB133111EB)
+    key = np.uint64(np.int64(part)) * np.uint64(0xD6E8FEB86659FD93)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(np.int64(a)) * np.uint64(0x9E3779B97F4A7C15)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(np.int64(b)) * np.uint64(0xBF58476D1CE4E5B9)
+    key = (key ^ (key >> np.uint64(29))) + np.uint64(np.int64(c)) * np.uint64(0x94D049BB133111EB)
     return key ^ (key >> np.uint64(32))
