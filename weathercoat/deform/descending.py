@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.deform.energy import Elastic, energy
+from weathercoat.deform.energy import Elastic, energy, sum_by_island
 from weathercoat.mesh.surface import Vectors
 
 _ON_PLANE = 1e-9  # film this close to the substrate lies on it [sizes]
@@ -69,7 +69,7 @@ def slide(elastic: Elastic, vectors: Vectors, held: Flags) -> Vectors:
 
 def sum_islands(elastic: Elastic, a: Vectors, b: Vectors) -> Vectors:
     """The scalar products of two fields (v, 3), for each island (k,)."""
-    return np.bincount(elastic.island, _dot(a, b), len(elastic.scale)).astype(np.float64, copy=False)
+    return sum_by_island(elastic.island, _dot(a, b), len(elastic.scale))
 
 
 def find_far(elastic: Elastic, gap: Vectors, value: Vectors, live: Flags) -> Flags:

@@ -24,7 +24,7 @@ from weathercoat.compile import formula, kernel
 from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.islands import label_islands
 from weathercoat.deform.parameters import Aim, DeformParameters
-from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
+from weathercoat.deform.targets import wanted_bend
 from weathercoat.mesh.dihedral import bend_angle
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
@@ -102,13 +102,13 @@ def make_elastic(
         island=island,
         length_island=length_island,
         angle_island=angle_island,
-        scale=_sum(angle_island, straightened, islands)
-        + _sum(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
+        scale=sum_by_island(angle_island, straightened, islands)
+        + sum_by_island(length_island, 0.5 * _LEAST_STRAIN**2 * length_weight, islands),
     )
 
 
-def _sum(island: Indices, values: Vectors, count: int) -> Vectors:
-    """The sums of values over each of `count` islands."""
+def sum_by_island(island: Indices, values: Vectors, count: int) -> Vectors:
+    """The sums of values over each of `count` islands, (count,)."""
     return np.bincount(island, values, count).astype(np.float64, copy=False)
 
 
@@ -227,10 +227,7 @@ def _gather_active(
             p4 = tail[prev_of(g)]
             if not (held and unknown[p3] < 0 and unknown[p4] < 0):
                 hinges[a, 0], hinges[a, 1], hinges[a, 2], hinges[a, 3] = p1, p2, p3, p4
-                if by_curvature:
-                    target[a] = curved_bend(start[h], span[h], radius, share_grown(rate * (age - since[h])))
-                else:
-                    target[a] = shrunk_bend(start[h], rate * (age - since[h]), floor)
+                target[a] = wanted_bend(start[h], since[h], span[h], by_curvature, radius, rate, floor, age)
                 angle_weight[a] = 0.5 * area * bending / (span[h] * span[h])
                 hinge_edge[a] = h
                 bend_at_rest[a] = bend_angle(rest, origin[p1], origin[p2], origin[p3], origin[p4])

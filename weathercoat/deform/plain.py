@@ -25,7 +25,7 @@ from weathercoat.deform.descending import Solved
 from weathercoat.deform.length import meet_length
 from weathercoat.deform.parameters import Aim, DeformParameters
 from weathercoat.deform.substrate import depth_below
-from weathercoat.deform.targets import curved_bend, half_tangent, share_grown, shrunk_bend
+from weathercoat.deform.targets import half_tangent, wanted_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of, prev_of
 from weathercoat.mesh.surface import Indices, Vectors
 
@@ -109,10 +109,7 @@ def bends_wanted(
 def _bends_wanted(start: Vectors, since: Vectors, span: Vectors, aim: Aim, out: Vectors) -> None:
     by_curvature, radius, rate, floor, age = aim.by_curvature, aim.radius, aim.rate, aim.floor, aim.age
     for i in range(len(out)):
-        if by_curvature:
-            out[i] = curved_bend(start[i], span[i], radius, share_grown(rate * (age - since[i])))
-        else:
-            out[i] = shrunk_bend(start[i], rate * (age - since[i]), floor)
+        out[i] = wanted_bend(start[i], since[i], span[i], by_curvature, radius, rate, floor, age)
 
 
 @kernel

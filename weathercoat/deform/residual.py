@@ -13,7 +13,7 @@ from weathercoat.deform.constraints import Constraints
 from weathercoat.deform.descending import resting, slide
 from weathercoat.deform.energy import energy, gradient, make_elastic, sum_of_forces
 from weathercoat.deform.parameters import Aim, DeformParameters
-from weathercoat.deform.targets import curved_bend, share_grown, shrunk_bend
+from weathercoat.deform.targets import wanted_bend
 from weathercoat.mesh.dihedral import half_edge_bend
 from weathercoat.mesh.halfedge import HalfEdgeMesh, next_of
 from weathercoat.mesh.surface import Vectors
@@ -95,10 +95,7 @@ def _errors(mesh: HalfEdgeMesh, start: Vectors, since: Vectors, span: Vectors, a
     for h in range(len(mesh.twin)):
         if not mesh.alive[h // 3] or mesh.twin[h] < h or math.isnan(start[h]):
             continue
-        if by_curvature:
-            wanted = curved_bend(start[h], span[h], radius, share_grown(rate * (age - since[h])))
-        else:
-            wanted = shrunk_bend(start[h], rate * (age - since[h]), floor)
+        wanted = wanted_bend(start[h], since[h], span[h], by_curvature, radius, rate, floor, age)
         out[found] = abs(half_edge_bend(h, mesh.positions, mesh.tail, mesh.twin) - wanted)
         found += 1
     return found

@@ -55,3 +55,14 @@ def curved_bend(start: float, span: float, radius: float, grown: float) -> float
 def shrunk_bend(start: float, turned: float, floor: float) -> float:
     """The bend of an outer dihedral that has shrunk by the angle `turned` down to a floor; literally."""
     return max(start - turned, min(start, floor - math.pi))
+
+
+@formula
+def wanted_bend(
+    start: float, since: float, span: float, by_curvature: bool, radius: float, rate: float, floor: float,
+    age: float,
+) -> float:  # fmt: skip
+    """The bend at an age of a hinge that began with `start` at the age `since`, by either rule."""
+    if by_curvature:
+        return curved_bend(start, span, radius, share_grown(rate * (age - since)))
+    return shrunk_bend(start, rate * (age - since), floor)
