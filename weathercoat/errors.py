@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+_LONGEST_MESSAGE = 300
+
 
 class WeathercoatError(Exception):
     """Base of every error that a user can meet.
@@ -30,7 +32,11 @@ class WeathercoatError(Exception):
     def line(self) -> str:
         """The whole message on one line, without the program's name."""
         where = f"{self.file}: " if self.file else ""
-        return _one_line(f"{where}{self.code}: {self.message}; {self.remedy}")
+        message = self.message
+        # A message may quote what a file holds where a number should be.
+        if len(message) > _LONGEST_MESSAGE:
+            message = message[: _LONGEST_MESSAGE - 3] + "..."
+        return _one_line(f"{where}{self.code}: {message}; {self.remedy}")
 
     def lines(self) -> list[str]:
         """The message as it is printed: one line for each problem."""

@@ -545,6 +545,7 @@ def _gltf() -> Iterator[OddFile]:
     yield odd("view_beyond", _with("bufferViews/1/byteLength", 10**12), code="E-CORRUPT", says="1000000000")
     yield odd("count_beyond", _with("accessors/0/count", 10**15), code="E-CORRUPT", says="bytes")
     yield odd("count_0", _with("accessors/0/count", 0), code="E-CORRUPT", says="count")
+    yield odd("count_a_novel", _with("accessors/0/count", "x" * 100_000), code="E-CORRUPT", says="xxx...;")
     yield odd("count_float", _with("accessors/0/count", 8.0), code="E-CORRUPT", says="8.0")
     moved = np.array([[0.0, 0.0, 0.0]], "<f4")
     lifted = np.array(CORNERS, "<f4")
