@@ -84,3 +84,9 @@ def test_errors_get_the_name_of_the_model_once() -> None:
         with pytest.raises(LimitError) as caught, name_errors("a.obj"):
             raise LimitError("too many faces", file=file)
         assert caught.value.file == expected
+
+
+def test_names_from_a_model_bring_no_escapes_to_the_terminal() -> None:
+    said: list[str] = []
+    report_notes([Note("W-GROUP", 1, "no \x1b[2Jgroup\nhere")], "a\x1b.obj", said.append)
+    assert said == ["a\\x1b.obj: W-GROUP(1): no \\x1b[2Jgroup here"]

@@ -43,9 +43,13 @@ class WeathercoatError(Exception):
         return [self.line()]
 
 
+def printable(text: str) -> str:
+    """`text` with what no terminal should get, such as an escape in a name, spelt out."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
 def _one_line(text: str) -> str:
-    """`text` on one line; what no terminal should get, such as an escape in a file name, is spelt out."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+    return printable(" ".join(text.split()))
 
 
 class UsageError(WeathercoatError):
@@ -257,3 +261,7 @@ class Note:
     code: str
     count: int
     message: str
+
+    def line(self) -> str:
+        """The note as it is printed, on one line."""
+        return _one_line(f"{self.code}({self.count}): {self.message}")

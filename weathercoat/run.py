@@ -17,7 +17,7 @@ from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.cost import require_memory, require_memory_to_read
 from weathercoat.deform.parameters import DeformParameters
-from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError
+from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError, printable
 from weathercoat.film.state import FilmParameters
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
@@ -260,7 +260,7 @@ def report_notes(
 ) -> None:
     """Say each note; raises StrictError for the first where `strict`."""
     for note in notes:
-        say(f"{name}: {note.code}({note.count}): {note.message}")
+        say(f"{printable(name)}: {note.line()}")
     if strict and notes:
         first = notes[0]
         raise StrictError(f"{first.code}({first.count}): {first.message}", file=name)

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from weathercoat.cli import options
+from weathercoat.errors import printable
 from weathercoat.memory import memory_limit
 
 
@@ -49,7 +50,7 @@ def command(
     if as_json:
         click.echo(json.dumps(found, indent=2, ensure_ascii=False))
     else:
-        click.echo("\n".join([*_lines(found), *refusal_lines(plan, limit)]))
+        click.echo("\n".join(map(printable, [*_lines(found), *refusal_lines(plan, limit)])))
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:
