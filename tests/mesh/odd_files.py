@@ -219,6 +219,12 @@ def _ply() -> Iterator[OddFile]:
         f"{_PLY_FACES}{_PLY_ROWS}"
     )
     yield odd("faces_first", turned)
+    yield odd(
+        "format_after_an_element",
+        "ply\nelement vertex 0\nproperty float x\nformat ascii 1.0\nelement face 0\nend_header\n",
+        code="E-CORRUPT",
+        says="line 4",
+    )
     for code, type in (("b", "char"), ("H", "ushort"), ("I", "uint32")):
         for mark, order in (("<", "little"), (">", "big")):
             header = _ply_text(
@@ -530,6 +536,15 @@ def _gltf() -> Iterator[OddFile]:
     quantized["bufferViews"][0]["byteStride"] = 8
     yield odd("quantized", quantized | {"extensionsRequired": ["KHR_mesh_quantization"]})
     yield odd("quantized_unasked", quantized, code="E-CORRUPT", says="5122")
+    yield odd("normalized_one", _with("accessors/0/normalized", 1), code="E-CORRUPT", says="neither true")
+    endless = np.ones((8, 3), "<f4")
+    endless[5, 1] = -np.inf
+    tinted = {"mode": 4, "attributes": {"POSITION": 0, "COLOR_0": 2}, "indices": 1}
+    yield odd(
+        "colour_infinite",
+        _gltf_of([positions, flat.astype("<u2"), endless], ["VEC3", "SCALAR", "VEC3"], tinted),
+        notes=("W-NONFINITE",),
+    )
     interleaved = np.zeros((8, 8), "<f4")
     interleaved[:, 3:6] = positions
     document = _gltf_of([interleaved, flat.astype("<u2")], ["VEC3", "SCALAR"], simple)

@@ -292,9 +292,9 @@ class _Document:
         if entry["type"] not in types:
             raise CorruptError(f"accessor {index} is of type {entry['type']}, expected {' or '.join(types)}")
         component = (entry["componentType"], entry.get("normalized", False))
-        if component not in components and (
-            components is _UNSIGNED or component[1] not in (True, False) or _QUANTIZED not in self.required
-        ):
+        if not isinstance(component[1], bool):
+            raise CorruptError(f"accessor {index} has a normalized that is neither true nor false")
+        if component not in components and (components is _UNSIGNED or _QUANTIZED not in self.required):
             raise CorruptError(f"accessor {index} cannot have the component type {component[0]} here")
         width, kind = _WIDTHS[entry["type"]], np.dtype(_COMPONENTS[entry["componentType"]])
         count = _positive(entry["count"], "count")
@@ -510,8 +510,10 @@ def _joined(
 
 
 def _encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Linear colours as sRGB (IEC 61966-2-1); a fourth column, opacity, stays as it is."""
-    linear = np.clip(linear, 0.0, 1.0)
+    """Linear colours as sRGB (IEC 61966-2-1); a fourth column, opacity, stays as it is, and so does what is
+    not finite.
+    """
+    linear = np.where(np.isfinite(linear), np.clip(linear, 0.0, 1.0), np.nan)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     encoded[:, 3:] = linear[:, 3:]
     return encoded

@@ -108,7 +108,7 @@ def _header(data: bytes) -> tuple[ByteOrder, list[Element], int, int]:
         if (words == ["ply"] and number == 1) or not words or words[0] in ("comment", "obj_info"):
             continue
         try:
-            if words[0] == "format" and words[2:] == ["1.0"] and order is None:
+            if words[0] == "format" and words[2:] == ["1.0"] and order is None and not elements:
                 order = _ORDERS[words[1]]
             else:
                 _declare(words, elements)
