@@ -65,7 +65,10 @@ def take_up(
             break
         passed = _passed_snapshots(checkpoint, config)
         if passed:
-            say(f"{place}: has no snapshot of step {passed[0]}, so the run begins again")
+            say(
+                f"{place}: has no snapshot of step {passed[0]}, so the run begins again; "
+                "snapshots.steps can name others"
+            )
             break
         if checkpoint.step > config.ageing.steps:
             what = f"the run has reached step {checkpoint.step}, and ageing.steps is {config.ageing.steps}"
