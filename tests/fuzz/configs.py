@@ -16,7 +16,6 @@ import shlex
 import tempfile
 import time
 from collections import Counter
-from itertools import count as count_up
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,7 +23,7 @@ import numpy as np
 
 from tests.fuzz import strict_configs
 from tests.fuzz.config_mutations import VALUES, Random, assignment, make_seeds, mutate
-from tests.fuzz.workers import Verdict, Worker
+from tests.fuzz.workers import Verdict, Worker, case_numbers
 from weathercoat.cli.handler import call
 from weathercoat.config.describe import json_schema, resolved_yaml
 from weathercoat.config.load import LoadedConfig, load_config
@@ -241,13 +240,10 @@ def run(
     seeds = make_seeds()
     outcomes: Counter[str] = Counter()
     violations = []
-    end = None if seconds is None else time.monotonic() + seconds
     with Worker(
         judge, Case(arguments=("run", "c.yaml", "m.obj", "-o", "out", "--steps", "2")), seconds=3 * _SECONDS
     ) as worker:
-        for number in count_up() if count is None else range(count):
-            if end is not None and time.monotonic() > end:
-                break
+        for number in case_numbers(count, seconds):
             case = make_case(seeds, seed, number)
             verdict = worker.judge(case)
             outcomes[f"{verdict.kind} {verdict.what}" if verdict.kind != "violation" else "violation"] += 1

@@ -11,7 +11,7 @@ import argparse
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,7 +20,7 @@ import numpy as np
 from tests.fuzz import strict
 from tests.fuzz.mutations import mutate
 from tests.fuzz.seeds import Seed, foreign_seeds, make_seeds, real_seeds
-from tests.fuzz.workers import Verdict, Worker
+from tests.fuzz.workers import Verdict, Worker, case_numbers
 from weathercoat.errors import WeathercoatError
 from weathercoat.mesh import topology
 from weathercoat.mesh.read import read_surface
@@ -129,25 +129,15 @@ def run(
     """Judge `count` cases, or as many as `seconds` allow, and tell `found` of each violation; how often each
     outcome."""
     outcomes: Counter[str] = Counter()
-    end = None if seconds is None else time.monotonic() + seconds
     first = sources.own[0]
     with Worker(judge, (first.extension, first.data)) as worker:
-        for number in _numbers(count):
-            if end is not None and time.monotonic() > end:
-                break
+        for number in case_numbers(count, seconds):
             case = make_case(sources, seed, number)
             verdict = worker.judge(case)
             outcomes[f"{verdict.kind} {verdict.what}" if verdict.kind != "violation" else "violation"] += 1
             if verdict.kind == "violation":
                 found(number, case, verdict)
     return outcomes
-
-
-def _numbers(count: int | None) -> Iterator[int]:
-    number = 0
-    while count is None or number < count:
-        yield number
-        number += 1
 
 
 def main(arguments: list[str]) -> int:

@@ -16,7 +16,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import count as count_up
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 from unittest.mock import patch
@@ -25,7 +24,7 @@ import numpy as np
 
 from tests import zoo
 from tests.fuzz.config_mutations import Random, valid_value
-from tests.fuzz.workers import Verdict, Worker
+from tests.fuzz.workers import Verdict, Worker, case_numbers
 from tests.sim.test_invariants import roughened
 from weathercoat.config.load import LoadedConfig, Override, load_config
 from weathercoat.config.presets import preset_names
@@ -248,12 +247,9 @@ def run(
     """Make `count` runs, or as many as `seconds` allow: how often each outcome, and the violations."""
     outcomes: Counter[str] = Counter()
     violations = []
-    end = None if seconds is None else time.monotonic() + seconds
     first = Case("octahedron", 0, 1.0, 0.0, "standard", {"ageing.steps": 2, "remesh": False})
     with Worker(judge, first, seconds=10 * _SECONDS, megabytes=2000) as worker:
-        for number in count_up() if count is None else range(count):
-            if end is not None and time.monotonic() > end:
-                break
+        for number in case_numbers(count, seconds):
             case = make_case(seed, number)
             verdict = worker.judge(case)
             solver = load(case.config, case.values).config.deformation.solver

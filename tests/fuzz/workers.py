@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import resource
 import signal
+import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import count as count_up
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
@@ -79,6 +81,15 @@ class Worker:
         self._process.kill()
         self._process.join()
         self._pipe.close()
+
+
+def case_numbers(count: int | None, seconds: float | None) -> Iterator[int]:
+    """The numbers of `count` cases, or of as many as begin within `seconds`; either may be None."""
+    end = None if seconds is None else time.monotonic() + seconds
+    for number in count_up() if count is None else range(count):
+        if end is not None and time.monotonic() > end:
+            return
+        yield number
 
 
 def _serve(pipe: Connection, judge: Judge, first: object, megabytes: int) -> None:
