@@ -6,9 +6,12 @@ An error is one line: what went wrong, where, and what to do. The command line p
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
+from typing import Any
 
 _LONGEST_MESSAGE = 300
+_DEVICE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class WeathercoatError(Exception):
@@ -41,6 +44,16 @@ class WeathercoatError(Exception):
     def lines(self) -> list[str]:
         """The message as it is printed: one line for each problem."""
         return [self.line()]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The error as JSON has it."""
+        return {
+            "code": self.code,
+            "exit_code": self.exit_code,
+            "file": self.file,
+            "message": self.message,
+            "remedy": self.remedy,
+        }
 
 
 def printable(text: str) -> str:
@@ -109,6 +122,11 @@ class ConfigError(WeathercoatError):
             return super().lines()
         keyed = ((p.place(), f"{p.key}: {p.what}" if p.key else p.what) for p in self.problems)
         return [_one_line(f"{place}: {self.code}: {what}") for place, what in keyed]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The error as JSON has it, with each problem."""
+        problems = {"problems": [vars(problem) for problem in self.problems]} if self.problems else {}
+        return {**super().as_dict(), **problems}
 
 
 class ModelError(WeathercoatError):
@@ -249,6 +267,48 @@ class ResumeError(OutputError):
 
     code = "E-RESUME"
     remedy = "choose another folder with -o, or begin anew with --overwrite"
+
+
+class BatchError(WeathercoatError):
+    """Some jobs of a batch failed; the results of the others are there, and a rerun goes on."""
+
+    code = "E-BATCH"
+    exit_code = 8
+    remedy = "mend what the messages name, and run the batch again; what is done is kept"
+
+
+class WorkerError(BatchError):
+    """The process that worked on a job ended without a word, more than once."""
+
+    code = "E-WORKER"
+    remedy = "give the job more memory, or run it alone to see what happens"
+
+
+def internal_error(error: Exception) -> WeathercoatError:
+    """What stands for an exception that is none of ours: a lack of memory, a device that fails, or a fault of
+    this program.
+    """
+    if _is_lack_of_memory(error):
+        return LimitError("out of memory", remedy="ask for fewer faces, or use a machine with more memory")
+    if isinstance(error, OSError) and error.errno in _DEVICE_ERRORS:
+        if error.filename is None:
+            remedy = "make room, or send it elsewhere"
+            return OutputError(str(error.strerror), file="standard output", remedy=remedy)
+        return OutputError(str(error.strerror), file=str(error.filename))
+    summary = " ".join(f"{type(error).__name__}: {error}".split())
+    return WeathercoatError(
+        f"internal error, {summary}", remedy="report it with the traceback that --debug prints"
+    )
+
+
+def _is_lack_of_memory(error: Exception) -> bool:
+    """Whether memory has run out, in the words of whoever noticed: Python, a thread, or the loader."""
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
+    words = {RuntimeError: "can't start new thread", ImportError: "failed to map segment"}
+    return isinstance(error, MemoryError) or any(
+        isinstance(error, kind) and text in str(error) for kind, text in words.items()
+    )
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.errors import ResumeError
 from weathercoat.output.checkpoints import SURFACE, Checkpoint, broken, read_checkpoint
@@ -27,6 +28,7 @@ from weathercoat.output.folder import (
     snapshot_stem,
 )
 from weathercoat.output.lock import LOCK
+from weathercoat.output.report import sha256, versions
 
 _FREE = ("ageing.steps", "ageing.duration", "snapshots.", "checkpoint.")  # keys that may differ
 
@@ -34,6 +36,16 @@ _FREE = ("ageing.steps", "ageing.duration", "snapshots.", "checkpoint.")  # keys
 def identify(config: Config, inputs: Mapping[str, str]) -> dict[str, Any]:
     """What tells a run from others, as checkpoints keep it: config, and SHA-256 of inputs by file name."""
     return {"config": config.as_dict(), "inputs": dict(inputs)}
+
+
+def fingerprint(loaded: LoadedConfig, inputs: Mapping[str, str]) -> str:
+    """A hash of all that the results of a run hang on: the config as it is before a quality has chosen,
+    SHA-256 of the inputs by file name, and versions.
+    """
+    config = loaded.config
+    fixed = [] if config.quality is None else sorted(loaded.fixed)  # what the quality may not change
+    content = {"config": config.as_dict(), "fixed": fixed, "inputs": dict(inputs), "versions": versions()}
+    return sha256(json.dumps(content, sort_keys=True).encode("utf-8", "backslashreplace"))
 
 
 def read_finished(folder: Path, identity: Mapping[str, Any]) -> dict[str, Any] | None:

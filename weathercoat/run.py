@@ -38,7 +38,7 @@ from weathercoat.output.report import (
 )
 from weathercoat.plan import Plan, make_plan
 from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
-from weathercoat.resume import identify, read_finished, recorded_figures, take_up
+from weathercoat.resume import fingerprint, identify, read_finished, recorded_figures, take_up
 from weathercoat.sim.recorders import Patience, Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
 from weathercoat.stain.color import Palette
@@ -144,6 +144,7 @@ def run_asset(
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
         report = _report(intake, meshed.notes, simulation, recorder, folder)
+        report["fingerprint"] = fingerprint(loaded, intake.inputs)
         write_json(folder / REPORT, report)
         if check:
             with watch.time("check"), name_errors(intake.name):

@@ -7,25 +7,22 @@ output went away, 143 terminated.
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import os
 import sys
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import Any
 
 import click
 
 from weathercoat.cli.root import weathercoat
 from weathercoat.cli.signals import Interrupted, Stopped
-from weathercoat.errors import ConfigError, LimitError, OutputError, UsageError, WeathercoatError
+from weathercoat.errors import UsageError, WeathercoatError, internal_error
 
 PROGRAM = "weathercoat"
 COMPLETION_VARIABLE = "_WEATHERCOAT_COMPLETE"
 _BROKEN_PIPE = 141
-_DEVICE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def run() -> int:
@@ -73,27 +70,7 @@ def _as_weathercoat_error(error: Exception) -> WeathercoatError:
         path = context.command_path if context else PROGRAM
         message = error.format_message().rstrip(".").replace(". Did", "; did")
         return UsageError(message, remedy=f"see `{path} --help`")
-    if _is_lack_of_memory(error):
-        return LimitError("out of memory", remedy="ask for fewer faces, or use a machine with more memory")
-    if isinstance(error, OSError) and error.errno in _DEVICE_ERRORS:
-        if error.filename is None:
-            remedy = "make room, or send it elsewhere"
-            return OutputError(str(error.strerror), file="standard output", remedy=remedy)
-        return OutputError(str(error.strerror), file=str(error.filename))
-    summary = " ".join(f"{type(error).__name__}: {error}".split())
-    return WeathercoatError(
-        f"internal error, {summary}", remedy="report it with the traceback that --debug prints"
-    )
-
-
-def _is_lack_of_memory(error: Exception) -> bool:
-    """Whether memory has run out, in the words of whoever noticed: Python, a thread, or the loader."""
-    if isinstance(error, OSError):
-        return error.errno == errno.ENOMEM
-    words = {RuntimeError: "can't start new thread", ImportError: "failed to map segment"}
-    return isinstance(error, MemoryError) or any(
-        isinstance(error, kind) and text in str(error) for kind, text in words.items()
-    )
+    return internal_error(error)
 
 
 def _report(raised: Exception, arguments: Sequence[str]) -> int:
@@ -103,23 +80,10 @@ def _report(raised: Exception, arguments: Sequence[str]) -> int:
     error = _as_weathercoat_error(raised)
     if "--json" in options:
         notes = {"notes": _notes(raised)} if _notes(raised) else {}
-        _say(json.dumps({"error": {**_as_dict(error), **notes}}, ensure_ascii=False))
+        _say(json.dumps({"error": {**error.as_dict(), **notes}}, ensure_ascii=False))
     else:
         _say("\n".join(f"{PROGRAM}: {line}" for line in [*error.lines(), *_notes(raised)]))
     return error.exit_code
-
-
-def _as_dict(error: WeathercoatError) -> dict[str, Any]:
-    content: dict[str, Any] = {
-        "code": error.code,
-        "exit_code": error.exit_code,
-        "file": error.file,
-        "message": error.message,
-        "remedy": error.remedy,
-    }
-    if isinstance(error, ConfigError) and error.problems:
-        content["problems"] = [vars(problem) for problem in error.problems]
-    return content
 
 
 def _stop(stopped: Stopped) -> int:

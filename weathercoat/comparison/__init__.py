@@ -1,0 +1,1 @@
+"""Comparing runs: figures, geometry and pictures, against the noise between seeds."""

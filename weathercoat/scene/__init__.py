@@ -1,0 +1,1 @@
+"""Scenes: many objects with their places, each weathered by its exposure."""
