@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from weathercoat.batch.job import Outcome, Task
-from weathercoat.errors import ResumeError, WeathercoatError, internal_error
+from weathercoat.errors import CorruptError, ResumeError, WeathercoatError, internal_error
 from weathercoat.run import run_asset
 from weathercoat.sim.recorders import Patience
 
@@ -45,9 +45,16 @@ def do_task(
         Path(task.target).parent.mkdir(parents=True, exist_ok=True)
         try:
             return run(resume=True)
-        except ResumeError:
+        except (ResumeError, CorruptError) as error:
+            if not _is_within(error.file, task.target):
+                raise
             return run(resume=False)
     except Exception as raised:
         error = raised if isinstance(raised, WeathercoatError) else internal_error(raised)
         seconds = time.perf_counter() - started
         return Outcome(task.job.name, "failed", seconds, None, error.as_dict(), tuple(messages))
+
+
+def _is_within(file: str | None, target: str) -> bool:
+    """Whether an error is about what an earlier run has left, in its folder or its working folder."""
+    return file is not None and str(Path(file).absolute()).startswith(str(Path(target).resolve()))

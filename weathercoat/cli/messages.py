@@ -72,6 +72,18 @@ class Messages:
             self._bar = tqdm(total=total, unit="step", leave=False, file=sys.stderr)
         self._bar.update(done - self._bar.n)
 
+    def share(self, done: float, what: str) -> None:
+        """Show that a share of all work is done; what: a few words, such as how many of how many jobs."""
+        if not self._has_bar:
+            return
+        if self._bar is None:
+            from tqdm import tqdm
+
+            form = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
+            self._bar = tqdm(total=1.0, leave=False, file=sys.stderr, bar_format=form)
+        self._bar.set_description_str(what, refresh=False)
+        self._bar.update(done - self._bar.n)
+
     def _write(self, *lines: str) -> None:
         now = time.strftime("%Y-%m-%d %H:%M:%S")
         with self._log_errors():

@@ -40,6 +40,8 @@ class _Assignment(click.ParamType):
         return [CompletionItem(f"{parameter.key}=", help=parameter.description) for parameter in matching]
 
 
+MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
+
 config = click.argument("config", type=_ConfigName())
 model = click.argument("model", type=click.Path(path_type=str))
 assignments = click.option(
@@ -69,6 +71,15 @@ threads = click.option(
     type=click.IntRange(min=1),
     metavar="N",
     help="Threads that share the work of a large film; all cores, at most 4, by default. Changes no result.",
+)
+
+
+workers = click.option(
+    "-j",
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="How many jobs run at once, as far as memory allows; as many as there are cores, by default.",
 )
 
 
@@ -106,6 +117,13 @@ log_file = click.option(
     "--log-file", type=click.Path(path_type=Path, dir_okay=False), help="Write all messages to a file too."
 )
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Print the traceback of an error.")
+
+
+def threads_beside(workers: int) -> int:
+    """The threads of a run, where so many go on at once."""
+    from weathercoat.deform.team import usable_cores
+
+    return max(1, min(MOST_THREADS, usable_cores() // workers))
 
 
 def shortcuts(**values: object) -> Iterator[Override]:

@@ -18,9 +18,6 @@ from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
 from weathercoat.errors import UsageError
 
-_MOST_THREADS = 4  # more gain little: what is met across tiles is met by one
-
-
 @click.command()
 @options.config
 @options.model
@@ -82,7 +79,6 @@ def command(
     stem = "model" if is_piped else Path(model).stem
     folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages, _say_how_to_go_on():
-        from weathercoat.deform.team import usable_cores
         from weathercoat.run import run_asset
 
         report = run_asset(
@@ -95,7 +91,7 @@ def command(
             strict=strict,
             check=check,
             max_memory=max_memory,
-            threads=threads or min(usable_cores(), _MOST_THREADS),
+            threads=threads or options.threads_beside(1),
             progress=messages.progress,
             log=messages.log,
             patience=Patience(),

@@ -13,12 +13,12 @@ LOCK = "lock"
 class FolderLock:
     """The lock of a folder: `take` it, and nobody else can until `release` or the end of the process.
 
-    It is a lock of the operating system on the file `lock` in the folder, so none is left behind by a process
+    It is a lock of the operating system on the file `name` in the folder, so none is left behind by a process
     that was killed.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / LOCK
+    def __init__(self, folder: Path, name: str = LOCK) -> None:
+        self._path = folder / name
         self._stream: BinaryIO | None = None
 
     def take(self) -> bool:

@@ -11,6 +11,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -223,6 +224,7 @@ def make_timing(simulation: Mapping[str, float], around: Mapping[str, float]) ->
     }
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions of Python, of the libraries that figures depend on, and of weathercoat."""
     found = {name: metadata.version(name) for name in LIBRARIES}

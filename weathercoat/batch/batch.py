@@ -1,0 +1,141 @@
+"""A batch: many jobs into one folder. What is done and unchanged stays; the others run, the longest first."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
+from weathercoat.batch.price import price_job
+from weathercoat.batch.record import Record
+from weathercoat.errors import OutputError, WeathercoatError
+from weathercoat.mesh.read import name_of
+from weathercoat.output.folder import REPORT, output_errors
+from weathercoat.output.lock import FolderLock
+from weathercoat.output.report import sha256
+from weathercoat.resume import fingerprint
+
+_LOCK = ".batch.lock"  # no job has a name like this
+
+Listener = Callable[[Progress | Outcome], None]
+
+
+def run_batch(
+    jobs: Sequence[Job],
+    out: str | Path,
+    executor: Executor,
+    *,
+    workers: int = 1,
+    threads: int = 1,
+    check: bool = True,
+    max_memory: int | None = None,
+    fail_fast: bool = False,
+    begin: Callable[[Sequence[Task]], None] | None = None,
+    listen: Listener | None = None,
+) -> dict[str, Any]:
+    """Run jobs into folders of their names in `out`, and return the content of its `batch.json`.
+
+    workers: how many run at once, for the record. threads: of each. check: whether results are verified.
+    max_memory: bytes beyond which a job is refused. fail_fast: the first failure ends the batch, and what has
+    not ended is dropped. begin: called with what is to be done, without what is unchanged. listen: called
+    with each event. A job that fails is in the record, and raises nothing. Raises OutputError where `out`
+    cannot be written, or another batch is at it.
+    """
+    folder = Path(out)
+    listen = listen or (lambda event: None)
+    with output_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with _sole_use(folder):
+        unchanged, left = sort_out(jobs, folder)
+        prices = {job.name: price_job(job) for job in left}
+        tasks = [
+            Task(job, str(folder / job.name), price.memory, price.seconds, threads, check, max_memory)
+            for job, price in ((job, prices[job.name]) for job in left)
+        ]
+        tasks.sort(key=lambda task: -task.seconds)
+        record = Record(folder, jobs, prices, workers)
+        state = "stopped"
+        try:
+            for outcome in unchanged:
+                record.note_outcome(outcome)
+                listen(outcome)
+            if begin:
+                begin(tasks)
+            if _run(tasks, executor, record, listen, fail_fast=fail_fast):
+                state = "finished"
+        finally:
+            record.end(state)
+        return record.as_dict()
+
+
+def _run(
+    tasks: Sequence[Task], executor: Executor, record: Record, listen: Listener, *, fail_fast: bool
+) -> bool:
+    """Whether all tasks have ended, and none of them early because another failed."""
+    if not tasks:
+        return True
+    with contextlib.closing(executor.run(tasks)) as events:  # type: ignore[type-var]
+        for event in events:
+            if isinstance(event, Progress):
+                record.note_progress(event.name, event.done, event.total)
+            else:
+                record.note_outcome(event)
+            listen(event)
+            if fail_fast and isinstance(event, Outcome) and event.status == "failed":
+                return False
+    return True
+
+
+def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
+    """Outcomes of the jobs whose results are in `out` and unchanged, and the jobs that are left to do."""
+    unchanged, left = [], []
+    digests: dict[str, str | None] = {}
+    for job in jobs:
+        figures = _finished_figures(out / job.name, job, digests)
+        if figures is None:
+            left.append(job)
+        else:
+            unchanged.append(Outcome(job.name, "unchanged", figures=figures, attempts=0))
+    return unchanged, left
+
+
+def _finished_figures(
+    folder: Path, job: Job, digests: dict[str, str | None]
+) -> dict[str, Any] | None:
+    """The last figures of the finished run in a folder, where it is that of the job; else None."""
+    try:
+        report = json.loads((folder / REPORT).read_bytes())
+        found, files, snapshots = report["fingerprint"], report["files"], report["snapshots"]
+        if job.asset not in digests:
+            digests[job.asset] = _digest(job.asset)
+        digest = digests[job.asset]
+        if digest is None or found != fingerprint(job.loaded, {name_of(Path(job.asset)): digest}):
+            return None
+        is_there = all((folder / name).is_file() for name in files)
+        return dict(snapshots[-1]) if is_there else None
+    except (OSError, ValueError, KeyError, TypeError, IndexError):
+        return None
+
+
+def _digest(asset: str) -> str | None:
+    try:
+        return sha256(Path(asset))
+    except WeathercoatError:
+        return None
+
+
+@contextlib.contextmanager
+def _sole_use(folder: Path) -> Iterator[None]:
+    """Keep other batches out of a folder."""
+    lock = FolderLock(folder, _LOCK)
+    with output_errors(folder):
+        is_mine = lock.take()
+    if not is_mine:
+        raise OutputError("another batch is writing it", file=str(folder))
+    try:
+        yield
+    finally:
+        lock.release(remove=True)
