@@ -102,9 +102,7 @@ def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
     return unchanged, left
 
 
-def _finished_figures(
-    folder: Path, job: Job, digests: dict[str, str | None]
-) -> dict[str, Any] | None:
+def _finished_figures(folder: Path, job: Job, digests: dict[str, str | None]) -> dict[str, Any] | None:
     """The last figures of the finished run in a folder, where it is that of the job; else None."""
     try:
         report = json.loads((folder / REPORT).read_bytes())

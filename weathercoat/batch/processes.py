@@ -7,6 +7,7 @@ does: at the end, and when the process that started it is killed.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import signal
@@ -75,11 +76,9 @@ class _Worker:
         """Hand out a task; where the worker has gone meanwhile, its end is an event to come."""
         self.attempt = attempt
         assert self._process.stdin is not None
-        try:
+        with contextlib.suppress(OSError):
             pickle.dump(attempt.task, self._process.stdin)
             self._process.stdin.flush()
-        except OSError:
-            pass
 
     def ask_to_stop(self) -> None:
         """Let it keep what it has and end."""
@@ -104,10 +103,8 @@ class _Worker:
 
     def _close_input(self) -> None:
         assert self._process.stdin is not None
-        try:
+        with contextlib.suppress(OSError):  # what was to be flushed is for nobody
             self._process.stdin.close()
-        except OSError:  # what was to be flushed is for nobody
-            pass
 
     def _listen(self, events: SimpleQueue[tuple[_Worker, Progress | Outcome | _Gone]]) -> None:
         assert self._process.stdout is not None

@@ -112,7 +112,7 @@ def _row(job: Job, price: Price | None) -> dict[str, Any]:
         "asset": job.asset,
         "config": job.loaded.source,
         "seed": config.seed,
-        "set": {key: value for key, value in _changed_keys(job)},
+        "set": dict(_changed_keys(job)),
         "folder": job.name,
         "status": "waiting",
         "expected": expected,

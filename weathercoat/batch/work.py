@@ -45,8 +45,8 @@ def do_task(
         Path(task.target).parent.mkdir(parents=True, exist_ok=True)
         try:
             return run(resume=True)
-        except (ResumeError, CorruptError) as error:
-            if not _is_within(error.file, task.target):
+        except (ResumeError, CorruptError) as found:
+            if not _is_within(found.file, task.target):
                 raise
             return run(resume=False)
     except Exception as raised:

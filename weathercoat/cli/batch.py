@@ -58,7 +58,9 @@ _MOST_NAMES = 5  # of the message about what failed
     show_default=True, help="What runs the jobs.",
 )  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS", help="Address of the Dask scheduler, with --executor dask.")
-@click.option("--dry-run", is_flag=True, help="Say what would be run and what it would cost, and run nothing.")
+@click.option(
+    "--dry-run", is_flag=True, help="Say what would be run and what it would cost, and run nothing."
+)
 @click.option("--fail-fast", is_flag=True, help="End the batch at the first job that fails.")
 @options.max_memory
 @options.no_check
@@ -94,9 +96,9 @@ def command(
     """Age many models: JOBS are model files, directories, globs in quotes, URLs, manifests (YAML or CSV), or
     - for a list on standard input.
 
-    Each job gets a folder of its name in the folder of the batch. A job that fails is reported, and the others
-    go on; the exit code is 8 then. What is done already, with the same input, config and version, is not done
-    again.
+    Each job gets a folder of its name in the folder of the batch. A job that fails is reported, and the
+    others go on; the exit code is 8 then. What is done already, with the same input, config and version, is
+    not done again.
 
     \b
     weathercoat batch models/ -c rusting -o aged
@@ -245,9 +247,8 @@ def _table(record: dict[str, Any]) -> Iterator[str]:
         rows = [row for row in rows if row["status"] == "failed"][:_MOST_ROWS]
     width = max((len(row["name"]) for row in rows), default=4)
     if rows:
-        yield (
-            f"{'job':{width}} {'status':>9} {'seconds':>8} {'separated':>10} {'lost':>7} {'flakes':>7} {'rust':>6}"
-        )
+        head = f"{'job':{width}} {'status':>9} {'seconds':>8}"
+        yield f"{head} {'separated':>10} {'lost':>7} {'flakes':>7} {'rust':>6}"
     for row in rows:
         line = f"{row['name']:{width}} {row['status']:>9} {row['seconds']:8.1f}"
         if row["figures"]:

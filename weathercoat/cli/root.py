@@ -15,7 +15,6 @@ from weathercoat.memory import require_address_space
 
 _SUBCOMMANDS = (
     "run",
-    "batch",
     "plan",
     "config",
     "sample",

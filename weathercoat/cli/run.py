@@ -18,6 +18,7 @@ from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
 from weathercoat.errors import UsageError
 
+
 @click.command()
 @options.config
 @options.model
