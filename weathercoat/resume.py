@@ -53,7 +53,12 @@ def read_finished(folder: Path, identity: Mapping[str, Any]) -> dict[str, Any] |
     report = _read_report(folder)
     if report is None or list(_differences(_identity_of(report), identity)):
         return None
-    return report
+    return None if missing_files(folder, report) else report
+
+
+def missing_files(folder: Path, report: Mapping[str, Any]) -> list[str]:
+    """The files that a `run.json` lists and that are not in its folder."""
+    return [name for name in report.get("files", ()) if not (folder / name).is_file()]
 
 
 def take_up(
@@ -74,6 +79,10 @@ def take_up(
         _check_same(found, identity, str(place))
         if checkpoint is None:
             say(f"{place}: keeps no checkpoint, so the run begins again")
+            break
+        missing = missing_files(place, _read_report(place) or {})
+        if missing:
+            say(f"{place}: {missing[0]} is missing, so the run begins again")
             break
         passed = _passed_snapshots(checkpoint, config)
         if passed:

@@ -16,7 +16,7 @@ from weathercoat.mesh.read import name_of
 from weathercoat.output.folder import REPORT, output_errors
 from weathercoat.output.lock import FolderLock
 from weathercoat.output.report import sha256
-from weathercoat.resume import fingerprint
+from weathercoat.resume import fingerprint, missing_files
 
 _LOCK = ".batch.lock"  # no job has a name like this
 
@@ -57,6 +57,7 @@ def run_batch(
         ]
         tasks.sort(key=lambda task: -task.seconds)
         record = Record(folder, jobs, prices, workers)
+        record.write()
         state = "stopped"
         try:
             for outcome in unchanged:
@@ -67,8 +68,8 @@ def run_batch(
             if _run(tasks, executor, record, listen, fail_fast=fail_fast):
                 state = "finished"
         finally:
-            record.end(state)
-        return record.as_dict()
+            content = record.end(state)
+        return content
 
 
 def _run(
@@ -106,14 +107,13 @@ def _finished_figures(folder: Path, job: Job, digests: dict[str, str | None]) ->
     """The last figures of the finished run in a folder, where it is that of the job; else None."""
     try:
         report = json.loads((folder / REPORT).read_bytes())
-        found, files, snapshots = report["fingerprint"], report["files"], report["snapshots"]
+        found, snapshots = report["fingerprint"], report["snapshots"]
         if job.asset not in digests:
             digests[job.asset] = _digest(job.asset)
         digest = digests[job.asset]
         if digest is None or found != fingerprint(job.loaded, {name_of(Path(job.asset)): digest}):
             return None
-        is_there = all((folder / name).is_file() for name in files)
-        return dict(snapshots[-1]) if is_there else None
+        return None if missing_files(folder, report) else dict(snapshots[-1])
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         return None
 

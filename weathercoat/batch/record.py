@@ -62,17 +62,19 @@ class Record:
         )
         self._changed()
 
-    def end(self, state: str) -> None:
-        """The batch has `finished`, or was `stopped` before its end; what was not begun is dropped."""
+    def end(self, state: str) -> dict[str, Any]:
+        """The batch has `finished`, or was `stopped` before its end, which drops what has not ended; returns
+        what is written.
+        """
         self.state = state
         for row in self._rows.values():
             if row["status"] in ("waiting", "running"):
                 row.pop("steps_done", None)
                 row.pop("steps", None)
                 row["status"] = "dropped"
-        self.write()
+        return self.write()
 
-    def as_dict(self) -> dict[str, Any]:
+    def _as_dict(self) -> dict[str, Any]:
         """The content of `batch.json`."""
         now = time.monotonic() - self._clock
         counts = Counter(row["status"] for row in self._rows.values())
@@ -85,15 +87,17 @@ class Record:
             "jobs": list(self._rows.values()),
         }
 
-    def write(self) -> None:
-        """Write the record; OutputError where that cannot be."""
+    def write(self) -> dict[str, Any]:
+        """Write the record, and return it; OutputError where that cannot be."""
         began = time.monotonic()
+        content = self._as_dict()
         aside = self._path.with_name(f".{RECORD}.partial")
         with output_errors(self._path):
-            write_json(aside, self.as_dict())
+            write_json(aside, content)
             os.replace(aside, self._path)  # noqa: PTH105
         took = time.monotonic() - began
         self._next_write = began + max(_SECONDS_BETWEEN_WRITES, took / _SHARE_OF_TIME)
+        return content
 
     def _changed(self) -> None:
         if time.monotonic() >= self._next_write:

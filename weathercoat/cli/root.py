@@ -22,6 +22,7 @@ _SUBCOMMANDS = (
     "remesh",
     "render",
     "verify",
+    "schema",
     "warmup",
     "bench",
     "completion",

@@ -11,6 +11,7 @@ from pathlib import Path
 _HEADER = 65_536
 _BYTES_PER_FACE = 40  # of files that do not tell: compressed, or of formats that only meshio knows
 _BINARY_STL = 84, 50  # bytes of the header and of a face
+_GLB_JSON = 20  # where it begins
 _PLY_FACES = re.compile(rb"element\s+face\s+(\d+)")
 _OFF_FACES = re.compile(rb"OFF\s+(?:#[^\n]*\s+)*\d+\s+(\d+)")
 
@@ -38,8 +39,8 @@ def _counted(head: bytes, size: int, extension: str) -> int | None:
     if head.startswith(b"ply"):
         match = _PLY_FACES.search(head)
         return int(match[1]) if match else None
-    if head.startswith(b"glTF"):
-        return _count_in_gltf(head[20 : 20 + struct.unpack_from("<I", head, 12)[0]])
+    if head.startswith(b"glTF") and len(head) >= _GLB_JSON:
+        return _count_in_gltf(head[_GLB_JSON : _GLB_JSON + struct.unpack_from("<I", head, 12)[0]])
     if extension == ".gltf":
         return _count_in_gltf(head)
     if extension == ".stl" and len(head) >= _BINARY_STL[0]:
