@@ -379,22 +379,7 @@ def test_completion_scripts_call_back(shell: str, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (
-            "weathercoat ",
-            {
-                "run",
-                "plan",
-                "config",
-                "sample",
-                "inspect",
-                "remesh",
-                "render",
-                "warmup",
-                "bench",
-                "completion",
-                "verify",
-            },
-        ),
+        ("weathercoat ", set(root.SUBCOMMANDS)),
         ("weathercoat run cr", {"crackle"}),
         ("weathercoat run crackle a.obj --set curl.ra", {"curl.radius=", "curl.rate="}),
         ("weathercoat sample b", {"barrel", "box", "bracket"}),

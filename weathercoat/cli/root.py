@@ -13,7 +13,7 @@ import click
 from weathercoat import __version__
 from weathercoat.memory import require_address_space
 
-_SUBCOMMANDS = (
+SUBCOMMANDS = (
     "run",
     "plan",
     "config",
@@ -31,10 +31,10 @@ _SUBCOMMANDS = (
 
 class _Subcommands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_SUBCOMMANDS)
+        return list(SUBCOMMANDS)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in _SUBCOMMANDS:
+        if name not in SUBCOMMANDS:
             return None
         command: click.Command = import_module(f"weathercoat.cli.{name}").command
         return command
