@@ -15,6 +15,7 @@ from weathercoat.errors import BatchError, UsageError
 
 if TYPE_CHECKING:
     from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
+    from weathercoat.memory import MemoryLimit
 
 _MOST_ROWS = 50  # of the table at the end; batch.json has all
 _MOST_NAMES = 5  # of the message about what failed
@@ -108,6 +109,7 @@ def command(
     from weathercoat.batch.batch import run_batch
     from weathercoat.batch.sources import collect_jobs
     from weathercoat.cli.messages import Messages
+    from weathercoat.memory import memory_limit
 
     if (kind == "dask") != (scheduler is not None):
         raise UsageError(
@@ -127,15 +129,18 @@ def command(
         out=Path(output),
     )
     size = _pool_size(kind, workers)
+    limit = memory_limit(max_memory)
     if dry_run:
-        _say_price(found, output, size, max_memory, as_json=as_json)
+        _say_price(found, output, size, limit, as_json=as_json)
         return
+    if limit is not None and kind == "processes":
+        max_memory = round(limit.bytes)  # of all workers, which do not ask again while others are at work
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
         teller = _Teller(messages, as_json=as_json)
         record = run_batch(
             found,
             output,
-            _make_executor(kind, size, scheduler, max_memory),
+            _make_executor(kind, size, scheduler, limit),
             workers=size,
             threads=options.threads_beside(size),
             check=check,
@@ -161,9 +166,8 @@ def _pool_size(kind: str, workers: int | None) -> int:
     return 1 if kind == "in-process" else workers or usable_cores()
 
 
-def _make_executor(kind: str, size: int, scheduler: str | None, max_memory: int | None) -> Executor:
+def _make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimit | None) -> Executor:
     from weathercoat.batch.processes import InlineExecutor, ProcessExecutor
-    from weathercoat.memory import memory_limit
 
     if kind == "in-process":
         from weathercoat.cli.signals import Patience
@@ -174,7 +178,6 @@ def _make_executor(kind: str, size: int, scheduler: str | None, max_memory: int 
 
         assert scheduler is not None
         return DaskExecutor(scheduler)
-    limit = memory_limit(max_memory)
     return ProcessExecutor(size, float("inf") if limit is None else limit.bytes)
 
 
@@ -263,19 +266,17 @@ def _table(record: dict[str, Any]) -> Iterator[str]:
 
 
 def _say_price(
-    jobs: Sequence[Job], output: str, workers: int, max_memory: int | None, *, as_json: bool
+    jobs: Sequence[Job], output: str, workers: int, limit: MemoryLimit | None, *, as_json: bool
 ) -> None:
     """What a batch would do and take, without running it."""
     from weathercoat.batch.batch import sort_out
     from weathercoat.batch.price import price_job, seconds_together, total_price
     from weathercoat.cost import in_megabytes
-    from weathercoat.memory import memory_limit
 
     unchanged, left = sort_out(jobs, Path(output))
     prices = {job.name: price_job(job) for job in left}
     total = total_price(prices)
     seconds = seconds_together(list(prices.values()), workers)
-    limit = memory_limit(max_memory)
     too_large = [name for name, price in prices.items() if limit and price.memory > limit.bytes]
     if as_json:
         content = {
