@@ -4,8 +4,9 @@
     python -m tests.measure_batch kills --assets 24 --kills 10
 
 `speed` ages so many small models (3,000 faces, 300 steps, no pictures) in this process, warm, and then by
-`weathercoat batch` with two workers; the bar is 1.25 times half the sum of the seconds in this process. `kills`
-kills a batch at random moments, runs it again, and compares what is there with a batch that was left alone.
+`weathercoat batch` with two workers; the bar is 1.25 times half the sum of the seconds in this process.
+`kills` kills a batch at random moments, runs it again, and compares what is there with a batch that was
+left alone.
 """
 
 from __future__ import annotations
@@ -81,7 +82,9 @@ def measure_speed(work: Path, count: int) -> None:
 
 def both(work: Path, models: list[Path]) -> tuple[list[Path], list[Path]]:
     """The folders of the same jobs in this process and in the batch."""
-    return [work / "alone" / model.stem for model in models], [work / "batch" / model.stem for model in models]
+    return [work / "alone" / model.stem for model in models], [
+        work / "batch" / model.stem for model in models
+    ]
 
 
 def measure_kills(work: Path, count: int, kills: int, seed: int) -> None:
@@ -93,7 +96,7 @@ def measure_kills(work: Path, count: int, kills: int, seed: int) -> None:
     whole = run_whole_batch(folder, expected)
     draw = random.Random(seed)
     wrong = redone = left = 0
-    for number in range(kills):
+    for _ in range(kills):
         out = work / "killed"
         moment = draw.uniform(0.0, whole)
         batch = start_batch(folder, out)
@@ -105,7 +108,10 @@ def measure_kills(work: Path, count: int, kills: int, seed: int) -> None:
         redone += sum(run.stat().st_ino != node for run, node in finished.items())
         wrong += sum(differs(out / model.stem, expected / model.stem) for model in models)
         left += len(list(out.glob("*.partial")))
-        print(f"killed after {moment:5.1f} of {whole:.1f} s with {len(finished)} of {count} finished", flush=True)
+        print(
+            f"killed after {moment:5.1f} of {whole:.1f} s with {len(finished)} of {count} finished",
+            flush=True,
+        )
         shutil.rmtree(out)
     print(f"{kills} kills: {redone} finished runs done again, {wrong} with other bytes, {left} left-overs")
 

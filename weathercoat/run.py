@@ -21,7 +21,7 @@ from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, Weat
 from weathercoat.film.state import FilmParameters
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
-from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface
+from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface, side_files
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
@@ -227,9 +227,17 @@ def _read(
     if isinstance(model, (str, Path)):
         require_memory_to_read(Path(model), limit)
         surface = read_surface(model, format=format, up=config.model.up)
-        return surface, {name_of(Path(model)): sha256(Path(model))}
+        return surface, hash_inputs(Path(model))
     content = model.read(MAX_BYTES + 1)  # one too many is refused below
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
+
+
+def hash_inputs(model: Path) -> dict[str, str]:
+    """SHA-256 of a model's file, and then of those beside it that it needs, by name.
+
+    Raises AccessError where one cannot be read.
+    """
+    return {name_of(file): sha256(file) for file in (model, *side_files(model))}
 
 
 @contextmanager

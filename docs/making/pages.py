@@ -83,7 +83,7 @@ _EXIT_CODES = {
     5: "over a limit of size, faces or memory",
     6: "a result fails its checks: the tool's own, and nothing was written, or a run given to `verify`",
     7: "the output cannot be written, or exists",
-    8: "reserved for batches: some assets failed, the others are kept",
+    8: "batch: some jobs failed; the results of the others are kept, and a rerun goes on",
     70: "internal error: please report it",
     130: "interrupted (Ctrl-C); nothing half-written is left",
     141: "whoever read the standard output went away, as `head` does",

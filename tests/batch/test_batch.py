@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,9 @@ from weathercoat.batch.batch import run_batch, sort_out
 from weathercoat.batch.job import Outcome
 from weathercoat.batch.processes import InlineExecutor
 from weathercoat.errors import OutputError
+from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.output.lock import FolderLock
+from weathercoat.output.meshes import write_mesh
 
 
 def statuses(record: dict) -> dict[str, str]:
@@ -142,3 +145,22 @@ def test_a_job_named_as_one_of_the_files_fails_alone(tmp_path: Path) -> None:
     jobs = [replace(make_job(tmp_path, "x"), name="batch.json"), make_job(tmp_path, "b")]
     record = run_batch(jobs, tmp_path / "out", InlineExecutor())
     assert statuses(record) == {"batch.json": "failed", "b": "done"}
+
+
+def test_the_buffers_of_a_gltf_are_part_of_the_input(tmp_path: Path) -> None:
+    write_mesh(tmp_path / "a.glb", make_random_sheet(100))
+    blob = (tmp_path / "a.glb").read_bytes()
+    length = struct.unpack_from("<I", blob, 12)[0]
+    content = json.loads(blob[20 : 20 + length])
+    buffer = bytearray(blob[28 + length :])
+    content["buffers"] = [{"uri": "a%20b.bin", "byteLength": len(buffer)}]
+    (tmp_path / "a.gltf").write_text(json.dumps(content))
+    (tmp_path / "a b.bin").write_bytes(buffer)
+    jobs = [replace(make_job(tmp_path, "a"), asset=str(tmp_path / "a.gltf"))]
+    run_batch(jobs, tmp_path / "out", InlineExecutor())
+    report = json.loads((tmp_path / "out" / "a" / "run.json").read_text())
+    assert sorted(report["inputs"]) == ["a b.bin", "a.gltf"]
+    assert not sort_out(jobs, tmp_path / "out")[1]
+    buffer[-1] ^= 1
+    (tmp_path / "a b.bin").write_bytes(buffer)
+    assert sort_out(jobs, tmp_path / "out")[1] == jobs

@@ -12,14 +12,23 @@ import time
 from pathlib import Path
 
 import pytest
+
+from tests.batch.jobs import result_bytes
+from tests.batch.test_processes import children, is_running, needs_proc
 from weathercoat.cli.handler import call
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.output.meshes import write_mesh
 
-from tests.batch.jobs import result_bytes
-from tests.batch.test_processes import children, is_running, needs_proc
-
-SMALL = ["--set", "remesh=off", "--set", "output.preview=false", "--steps", "30", "--set", "snapshots.count=2"]
+SMALL = [
+    "--set",
+    "remesh=off",
+    "--set",
+    "output.preview=false",
+    "--steps",
+    "30",
+    "--set",
+    "snapshots.count=2",
+]
 INLINE = ["--executor", "in-process"]
 
 
@@ -121,9 +130,11 @@ def test_a_batch_that_was_stopped_goes_on(how: signal.Signals, models: Path, tmp
         time.sleep(0.01)
     workers = children(batch.pid)
     batch.send_signal(how)
-    _, said = batch.communicate()
+    batch.communicate()
     codes = {signal.SIGKILL: -signal.SIGKILL, signal.SIGINT: 130, signal.SIGTERM: 143}
-    assert batch.returncode == codes[how] or (batch.returncode == 0 and len(list(out.glob("*/run.json"))) == 3)
+    assert batch.returncode == codes[how] or (
+        batch.returncode == 0 and len(list(out.glob("*/run.json"))) == 3
+    )
     while any(is_running(worker) for worker in workers):
         assert time.monotonic() < deadline
         time.sleep(0.01)

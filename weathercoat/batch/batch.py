@@ -11,12 +11,11 @@ from typing import Any
 from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
 from weathercoat.batch.price import price_job
 from weathercoat.batch.record import Record
-from weathercoat.errors import OutputError, WeathercoatError
-from weathercoat.mesh.read import name_of
+from weathercoat.errors import AccessError, OutputError
 from weathercoat.output.folder import REPORT, output_errors
 from weathercoat.output.lock import FolderLock
-from weathercoat.output.report import sha256
 from weathercoat.resume import fingerprint, missing_files
+from weathercoat.run import hash_inputs
 
 _LOCK = ".batch.lock"  # no job has a name like this
 
@@ -93,9 +92,9 @@ def _run(
 def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
     """Outcomes of the jobs whose results are in `out` and unchanged, and the jobs that are left to do."""
     unchanged, left = [], []
-    digests: dict[str, str | None] = {}
+    inputs: dict[str, dict[str, str]] = {}
     for job in jobs:
-        figures = _finished_figures(out / job.name, job, digests)
+        figures = _finished_figures(out / job.name, job, inputs)
         if figures is None:
             left.append(job)
         else:
@@ -103,25 +102,17 @@ def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
     return unchanged, left
 
 
-def _finished_figures(folder: Path, job: Job, digests: dict[str, str | None]) -> dict[str, Any] | None:
+def _finished_figures(folder: Path, job: Job, inputs: dict[str, dict[str, str]]) -> dict[str, Any] | None:
     """The last figures of the finished run in a folder, where it is that of the job; else None."""
     try:
         report = json.loads((folder / REPORT).read_bytes())
         found, snapshots = report["fingerprint"], report["snapshots"]
-        if job.asset not in digests:
-            digests[job.asset] = _digest(job.asset)
-        digest = digests[job.asset]
-        if digest is None or found != fingerprint(job.loaded, {name_of(Path(job.asset)): digest}):
+        if job.asset not in inputs:
+            inputs[job.asset] = hash_inputs(Path(job.asset))
+        if found != fingerprint(job.loaded, inputs[job.asset]):
             return None
         return None if missing_files(folder, report) else dict(snapshots[-1])
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
-        return None
-
-
-def _digest(asset: str) -> str | None:
-    try:
-        return sha256(Path(asset))
-    except WeathercoatError:
+    except (OSError, ValueError, KeyError, TypeError, IndexError, AccessError):
         return None
 
 

@@ -6,10 +6,12 @@ model's folder is read, and nothing from the network.
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from pathlib import Path
 from typing import BinaryIO
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -66,6 +68,22 @@ def read_surface(
 def name_of(path: Path) -> str:
     """The name of a file, read as UTF-8 whatever the locale, so that it is written the same in all."""
     return os.fsencode(path.name).decode("utf-8", "surrogateescape")
+
+
+def side_files(path: Path) -> list[Path]:
+    """The files beside a model that hold parts of its geometry: the buffers of a .gltf; sorted, and only
+    those that are there. Whatever is wrong with the model or with them, reading it tells.
+    """
+    if path.suffix.lower() != ".gltf":
+        return []
+    try:
+        buffers = json.loads(path.read_bytes())["buffers"]
+        names = {str(buffer["uri"]) for buffer in buffers if "uri" in buffer}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+    folder = path.parent.resolve()
+    beside = {(folder / unquote(name)).resolve() for name in names if not name.startswith("data:")}
+    return sorted(file for file in beside if file.is_relative_to(folder) and file.is_file())
 
 
 def read_stream(
