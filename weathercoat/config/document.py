@@ -52,13 +52,7 @@ def read_document(data: bytes, where: str) -> dict[str, Item]:
     """The mapping that a YAML file holds, empty for comments alone. Raises `ConfigError`."""
     if len(data) > LARGEST_FILE:
         raise ConfigError.at(where, f"larger than {LARGEST_FILE // 1024} KiB, this is no config")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        what = f"byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        raise ConfigError.at(where, what, line=line) from None
-    node = _compose(text, where)
+    node = _compose(decode(data, where), where)
     reader = _Reader(where)
     value = None if node is None else reader.read(node, "")
     if not reader.problems and value is not None and not isinstance(value, dict):
@@ -66,6 +60,28 @@ def read_document(data: bytes, where: str) -> dict[str, Item]:
     if reader.problems:
         raise ConfigError(problems=tuple(reader.problems))
     return value or {}
+
+
+def read_items(data: bytes, where: str, most_nodes: int) -> Any:
+    """What a YAML file holds, at most `most_nodes` values, with the lines of what is in a list as well: a
+    list is one of items. Raises `ConfigError`.
+    """
+    node = _compose(decode(data, where), where)
+    reader = _Reader(where, most_nodes, keeps_lines=True)
+    value = None if node is None else reader.read(node, "")
+    if reader.problems:
+        raise ConfigError(problems=tuple(reader.problems))
+    return value
+
+
+def decode(data: bytes, where: str) -> str:
+    """The text of a file in UTF-8, without a byte order mark. Raises `ConfigError` with the line."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        what = f"byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        raise ConfigError.at(where, what, line=line) from None
 
 
 def read_value(text: str, where: str, key: str) -> Any:
@@ -100,16 +116,18 @@ def _compose(text: str, where: str) -> yaml.Node | None:
 class _Reader:
     """Turns nodes into values, and counts them, since an alias may repeat its anchor at will."""
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, where: str, most_nodes: int = MOST_NODES, *, keeps_lines: bool = False) -> None:
         self.where = where
+        self.most_nodes = most_nodes
+        self.keeps_lines = keeps_lines
         self.problems: list[ConfigProblem] = []
         self.nodes = 0
         self.open: set[int] = set()
 
     def read(self, node: yaml.Node, key: str) -> Any:
         self.nodes += 1
-        if self.nodes > MOST_NODES:
-            what = f"more than {MOST_NODES:,} values, aliases included"
+        if self.nodes > self.most_nodes:
+            what = f"more than {self.most_nodes:,} values, aliases included"
             raise ConfigError(problems=(*self.problems, ConfigProblem(self.where, 0, "", what)))
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node, key)
@@ -120,7 +138,11 @@ class _Reader:
             if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
                 return self._mapping(node, key)
             if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
-                return [without_lines(self.read(child, f"{key}[{i}]")) for i, child in enumerate(node.value)]
+                items = (
+                    Item(self.read(child, f"{key}[{i}]"), child.start_mark.line + 1)
+                    for i, child in enumerate(node.value)
+                )
+                return [item if self.keeps_lines else without_lines(item.value) for item in items]
         finally:
             self.open.discard(id(node))
         return self._refuse(node, key, f"the tag {node.tag} is not supported")
@@ -160,7 +182,9 @@ class _Reader:
 
 
 def without_lines(value: Any) -> Any:
-    """`value` without the lines of its mappings."""
-    return (
-        {key: without_lines(item.value) for key, item in value.items()} if isinstance(value, dict) else value
-    )
+    """`value` without the lines of its mappings, and of its lists where they have them."""
+    if isinstance(value, dict):
+        return {key: without_lines(item.value) for key, item in value.items()}
+    if isinstance(value, list):
+        return [without_lines(item.value) if isinstance(item, Item) else item for item in value]
+    return value

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,11 +30,14 @@ _OFF = (False, "off", "no")
 
 
 class Override(NamedTuple):
-    """A value from the command line: dotted key, value, and the option that gave it."""
+    """A value that comes after the file's: dotted key, value, and the option that gave it, or the file and
+    its line.
+    """
 
     key: str
     value: Any
     option: str = "--set"
+    line: int = 0
 
 
 @dataclass(frozen=True)
@@ -73,35 +78,67 @@ def load_config(
     it sets, but for `auto`, which needs the model (see `weathercoat.plan`). Raises `ConfigError` with every
     problem.
     """
-    source = os.fspath(path_or_preset)
-    merge = _Merge()
-    layers = [_read_layer(source)]
-    for override in overrides:
-        try:
-            layers.append(_override_layer(override))
-        except ConfigError as error:
-            merge.problems += error.problems
-    for name, origin in _wanted_presets(layers):
-        if name in preset_names():
-            merge.add(_preset_layer(name))
-        else:
-            what = f"no shipped config {shortened(name)}; there are {', '.join(preset_names())}"
-            merge.problems.append(ConfigProblem(*origin, "preset", what))
-    for layer in layers:
-        merge.add(layer)
-    config = merge.validate()
-    origins = {
-        key: merge.origins.get(tuple(key.split(".")), _Origin(DEFAULT, 0)) for key in resolved_keys(config)
-    }
-    loaded = LoadedConfig(
-        config,
-        {key: str(origin) for key, origin in origins.items()},
-        source,
-        _fixed_keys(origins, layers),
-    )
-    if config.quality is None or config.quality == AUTO:
-        return loaded
-    return with_point(loaded, point_of(config.quality), f"quality {config.quality}")
+    return ConfigLoader().load(path_or_preset, overrides)
+
+
+class ConfigLoader:
+    """Loads configs as `load_config` does, many of them from a few files, each of which is read once."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, _Layer | ConfigError] = {}
+        self._presets: dict[str, _Layer] = {}
+
+    def load(
+        self, path_or_preset: str | os.PathLike[str], overrides: Sequence[str | Override] = ()
+    ) -> LoadedConfig:
+        """The config of a file or preset with overrides; see `load_config`."""
+        source = os.fspath(path_or_preset)
+        merge = _Merge()
+        layers = [self._file(source)]
+        for override in overrides:
+            try:
+                layers.append(_override_layer(override))
+            except ConfigError as error:
+                merge.problems += error.problems
+        for name, origin in _wanted_presets(layers):
+            preset = self._preset(name)
+            if preset:
+                merge.add(preset)
+            else:
+                what = f"no shipped config {shortened(name)}; there are {', '.join(preset_names())}"
+                merge.problems.append(ConfigProblem(*origin, "preset", what))
+        for layer in layers:
+            merge.add(layer)
+        config = merge.validate()
+        nowhere = _Origin(DEFAULT, 0)
+        origins = {
+            key: merge.origins.get(path, nowhere) for key, path in _resolved_keys(bool(config.remesh)).items()
+        }
+        loaded = LoadedConfig(
+            config,
+            {key: sys.intern(str(origin)) for key, origin in origins.items()},
+            source,
+            _fixed_keys(origins, layers),
+        )
+        if config.quality is None or config.quality == AUTO:
+            return loaded
+        return with_point(loaded, point_of(config.quality), f"quality {config.quality}")
+
+    def _file(self, source: str) -> _Layer:
+        if source not in self._files:
+            try:
+                self._files[source] = _read_layer(source)
+            except ConfigError as error:
+                self._files[source] = error
+        layer = self._files[source]
+        if isinstance(layer, ConfigError):
+            raise layer
+        return layer
+
+    def _preset(self, name: str) -> _Layer | None:
+        if name not in self._presets and name in preset_names():
+            self._presets[name] = _preset_layer(name)
+        return self._presets.get(name)
 
 
 def _fixed_keys(origins: Mapping[str, _Origin], layers: Sequence[_Layer]) -> frozenset[str]:
@@ -115,13 +152,14 @@ def _fixed_keys(origins: Mapping[str, _Origin], layers: Sequence[_Layer]) -> fro
     return frozenset(key for key in origins if say_of(key) >= max(say_of("quality"), 0))
 
 
-def resolved_keys(config: Config) -> list[str]:
-    """The dotted keys that hold a value in `config`: all, but for those below `remesh` where that is off."""
+@cache
+def _resolved_keys(is_remeshed: bool) -> dict[str, KeyPath]:
+    """The dotted keys that hold a value, with their paths: all, but none below `remesh` where that is off."""
     keys = [parameter.key for parameter in parameters()]
-    if config.remesh:
-        return keys
-    first = next(i for i, key in enumerate(keys) if key.startswith("remesh."))
-    return [*keys[:first], "remesh", *(key for key in keys[first:] if not key.startswith("remesh."))]
+    if not is_remeshed:
+        first = next(i for i, key in enumerate(keys) if key.startswith("remesh."))
+        keys = [*keys[:first], "remesh", *(key for key in keys[first:] if not key.startswith("remesh."))]
+    return {key: tuple(key.split(".")) for key in keys}
 
 
 def _read_layer(source: str) -> _Layer:
@@ -174,9 +212,9 @@ def _override_layer(override: str | Override) -> _Layer:
         if not sign or not all(key.split(".")):
             raise ConfigError.at("--set", f"{shortened(override)} must be key.path=value")
         override = Override(key, read_value(text, "--set", key))
-    item = Item(override.value, 0)
+    item = Item(override.value, override.line)
     for name in reversed(override.key.split(".")):
-        item = Item({name: item}, 0)
+        item = Item({name: item}, override.line)
     return _Layer(item.value, override.option, override.key)
 
 
@@ -232,7 +270,8 @@ class _Merge:
             elif item.value is None and path != ("snapshots", "count"):
                 self.report(path, "has no value" + color_hint(path))
             else:
-                self._forget_below(path)
+                if is_section:
+                    self._forget_below(path)
                 target[name] = without_lines(item.value)
 
     def _forget_below(self, path: KeyPath) -> None:

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -549,6 +550,7 @@ def section_of(field: FieldInfo) -> type[Section] | None:
     return None
 
 
+@cache
 def section_at(path: tuple[str, ...]) -> type[Section] | None:
     """The section at a path of keys, all of the config for none; None for a parameter or unknown key."""
     section: type[Section] | None = Config

@@ -24,7 +24,7 @@ def explain(detail: Any) -> tuple[KeyPath, str]:
     kind, value, limits = detail["type"], detail["input"], detail.get("ctx", {})
     shown = _shown(value)
     if kind == "extra_forbidden":
-        return path, "unknown key" + _nearest_key(path)
+        return path, "unknown key" + nearest_key(path)
     if kind == "value_error":
         return path, f"{limits['error']}" + ("" if isinstance(value, dict) else f", not {shown}")
     if kind == "literal_error":
@@ -69,7 +69,7 @@ def shortened(value: Any) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def _nearest_key(path: KeyPath) -> str:
+def nearest_key(path: KeyPath) -> str:
     """The key that was meant: a sibling, the paper's symbol, or a key of that name in another section."""
     section = section_at(path[:-1])
     name, prefix = path[-1], ".".join((*path[:-1], ""))

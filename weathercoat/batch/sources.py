@@ -1,0 +1,253 @@
+"""From the arguments of a batch to its jobs: files, globs, folders, lists, manifests, and studies of them."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path, PurePath
+from typing import BinaryIO
+
+from weathercoat.batch.job import Job
+from weathercoat.batch.manifest import Row, is_manifest, read_manifest
+from weathercoat.batch.names import (
+    PARTIAL,
+    RECORD,
+    Named,
+    NameStyle,
+    check_names,
+    found_name,
+    is_url,
+    model_name,
+)
+from weathercoat.batch.study import Study, parse_study
+from weathercoat.config.load import ConfigLoader, LoadedConfig, Override
+from weathercoat.errors import ConfigError, ConfigProblem, LimitError, UsageError
+from weathercoat.mesh.formats.sniff import FOREIGN, OWN
+from weathercoat.output.folder import REPORT
+
+MOST_JOBS = 100_000
+
+_EXTENSIONS = frozenset(f".{name}" for name in (*OWN, *FOREIGN))
+
+
+def collect_jobs(
+    arguments: Sequence[str],
+    *,
+    config: str = "standard",
+    overrides: Sequence[str | Override] = (),
+    matrix: Sequence[str] = (),
+    vary: Sequence[str] = (),
+    variants: int | None = None,
+    names: NameStyle = "stem",
+    null_separated: bool = False,
+    stdin: BinaryIO | None = None,
+    out: Path | None = None,
+) -> list[Job]:
+    """The jobs of a batch, in the order of its arguments, with names of their own and valid configs.
+
+    arguments: models by path or URL, globs, folders, manifests, and `-` for a list of models on `stdin`, one
+    a line or, `null_separated`, each with a NUL behind it. config: of jobs whose manifest names none.
+    overrides: as `load_config` takes them, after what a manifest sets. matrix, vary, variants: see
+    `study.parse_study`. names: `stem`, or `path` for names that are paths as they were given. out: where
+    results will be, which is not looked at for models.
+
+    A model that does not exist is no error here: its job will fail by itself. Raises UsageError for arguments
+    that name nothing, for two jobs with one name, and for a study that is none; ConfigError with all problems
+    of all manifests or of all configs; LimitError for more than MOST_JOBS jobs.
+    """
+    study = parse_study(matrix, vary, variants)
+    search = _Search(names, out)
+    rows: list[Row] = []
+    problems: list[ConfigProblem] = []
+    for argument in arguments:
+        try:
+            if argument == "-":
+                rows += _listed(_taken(stdin, argument, arguments), names, null_separated)
+            else:
+                rows += search.rows_of(argument)
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems=tuple(problems))
+    if not rows:
+        raise UsageError("there are no jobs", remedy="name models, folders, globs or a manifest")
+    if len(rows) * study.size > MOST_JOBS:
+        what = f"asks for {len(rows) * study.size:,} jobs, the most is {MOST_JOBS:,}"
+        raise LimitError(what, remedy="make several batches")
+    check_names(Named(row.name, row.asset, row.place) for row in rows)
+    return _Studio(study, config, tuple(overrides)).jobs_of(rows)
+
+
+def _taken(stdin: BinaryIO | None, argument: str, arguments: Sequence[str]) -> bytes:
+    if stdin is None or arguments.count(argument) > 1:
+        raise UsageError("- stands for standard input, which is read once", remedy="give it once")
+    return stdin.read()
+
+
+def _listed(data: bytes, style: NameStyle, null_separated: bool) -> Iterator[Row]:
+    """A row for each model in a list; lines that are blank or begin with # are passed over."""
+    if null_separated:
+        items = [item for item in data.split(b"\0") if item]
+    else:
+        lines = data.removeprefix(b"\xef\xbb\xbf").split(b"\n")
+        items = [
+            line.removesuffix(b"\r") for line in lines if line.strip() and not line.lstrip().startswith(b"#")
+        ]
+    if not items:
+        raise UsageError("the list on standard input holds no models", remedy="give one a line")
+    for number, item in enumerate(items, 1):
+        model = os.fsdecode(item)
+        yield Row(model_name(model, style), model, f"standard input, model {number}")
+
+
+class _Search:
+    """Finds the models that arguments stand for, but not those that a batch or run has written."""
+
+    def __init__(self, style: NameStyle, out: Path | None) -> None:
+        self._style = style
+        self._out = None if out is None else os.path.realpath(out)
+        self._is_ours = cache(self._look)
+
+    def rows_of(self, argument: str) -> list[Row]:
+        """The rows of an argument other than `-`. Raises UsageError where it is a folder or a glob with no
+        model, and ConfigError for a manifest that is not valid.
+        """
+        if not argument:
+            raise UsageError("an argument is empty", remedy="name models, folders, globs or a manifest")
+        if is_url(argument):
+            return [self._named(argument)]
+        if os.path.isdir(argument):  # noqa: PTH112 (any text will do)
+            return self._found(argument, argument, self._below(argument))
+        if not os.path.lexists(argument) and glob.has_magic(argument):
+            folder, found = self._matches(argument)
+            return self._found(argument, folder, found)
+        return read_manifest(argument, self._style) if is_manifest(argument) else [self._named(argument)]
+
+    def _named(self, model: str) -> Row:
+        return Row(model_name(model, self._style), model, model)
+
+    def _found(self, argument: str, folder: str, found: list[PurePath]) -> list[Row]:
+        if not found:
+            remedy = "results of runs and hidden files are passed over; name files to take them all the same"
+            raise UsageError("no model is there", file=argument, remedy=remedy)
+        rows: list[Row] = []
+        for path in sorted(found, key=lambda path: path.parts):
+            whole = os.path.join(folder, path)  # noqa: PTH118 (keeps the path as it was given)
+            if is_manifest(whole):
+                rows += read_manifest(whole, self._style)
+            else:
+                rows.append(Row(found_name(folder, path, self._style), whole, argument))
+        return rows
+
+    def _below(self, folder: str) -> list[PurePath]:
+        """The models below a folder, relative to it."""
+
+        def refuse(error: OSError) -> None:
+            what = f"cannot be searched: {error.strerror}"
+            raise UsageError(what, file=str(error.filename), remedy="name the models themselves") from error
+
+        found: list[PurePath] = []
+        for place, folders, files in os.walk(folder, onerror=refuse):
+            folders[:] = [
+                name
+                for name in folders
+                if not name.startswith(".") and not self._is_ours(os.path.join(place, name))  # noqa: PTH118
+            ]
+            above = PurePath(os.path.relpath(place, folder))
+            found += [above / name for name in files if not name.startswith(".") and _is_model(name)]
+        return found
+
+    def _matches(self, pattern: str) -> tuple[str, list[PurePath]]:
+        """The fixed part of a glob, and the files that match, relative to it: with the extension that the
+        pattern names, or else with that of a model.
+        """
+        parts = PurePath(pattern).parts
+        count = next(i for i, part in enumerate(parts) if glob.has_magic(part))
+        folder = str(PurePath(*parts[:count])) if count else ""
+        extension = os.path.splitext(parts[-1])[1]  # noqa: PTH122
+        names_extension = bool(extension) and not glob.has_magic(extension)
+        found = []
+        for match in set(glob.glob(pattern, recursive=True)):  # noqa: PTH207 (takes absolute ones too)
+            path = PurePath(match).relative_to(folder)
+            above = (os.path.join(folder, parent) for parent in path.parents if parent.parts)  # noqa: PTH118
+            if (
+                (names_extension or _is_model(path.name))
+                and os.path.isfile(match)  # noqa: PTH113
+                and not any(map(self._is_ours, above))
+            ):
+                found.append(path)
+        return folder, found
+
+    def _look(self, folder: str) -> bool:
+        """Whether a folder holds results: of a run, of a batch, or of this one."""
+        if folder.endswith(PARTIAL) or os.path.realpath(folder) == self._out:
+            return True
+        return any(os.path.isfile(os.path.join(folder, name)) for name in (REPORT, RECORD))  # noqa: PTH113, PTH118
+
+
+def _is_model(name: str) -> bool:
+    return os.path.splitext(name)[1].lower() in _EXTENSIONS  # noqa: PTH122
+
+
+class _Studio:
+    """Makes jobs of rows, loads each distinct config once, and collects what is wrong with any."""
+
+    def __init__(self, study: Study, config: str, overrides: tuple[str | Override, ...]) -> None:
+        self._study = study
+        self._config = config
+        self._overrides = overrides
+        self._loader = ConfigLoader()
+        self._loaded: dict[tuple[str, str], LoadedConfig | ConfigError] = {}
+        self._problems: dict[tuple[str, ...], tuple[ConfigProblem, list[str]]] = {}
+
+    def jobs_of(self, rows: Sequence[Row]) -> list[Job]:
+        """The jobs that the study makes of all rows. Raises ConfigError with the problems of all of them."""
+        jobs = [job for row in rows for job in self._members_of(row)]
+        if self._problems:
+            found = self._problems.values()
+            raise ConfigError(problems=tuple(self._naming(*entry, len(rows)) for entry in found))
+        return jobs
+
+    def _members_of(self, row: Row) -> Iterator[Job]:
+        for member in self._study.combinations:
+            name = f"{row.name}/{member.suffix}" if member.suffix else row.name
+            config = member.config or row.config or self._config
+            overrides = (*row.overrides, *self._overrides, *member.overrides)
+            loaded = self._load(name, config, overrides)
+            if loaded is None:
+                continue
+            if self._study.variants is None:
+                yield Job(name, row.asset, loaded, row.format)
+                continue
+            for variant in self._study.drawn(loaded.config.seed, name):
+                own = f"{name}/{variant.suffix}"
+                drawn = self._load(own, variant.config or config, (*overrides, *variant.overrides))
+                if drawn is not None:
+                    yield Job(own, row.asset, drawn, row.format)
+
+    def _load(self, name: str, config: str, overrides: tuple[str | Override, ...]) -> LoadedConfig | None:
+        """The config of a job, or None where it is not valid."""
+        key = (config, repr(overrides))
+        if key not in self._loaded:
+            try:
+                self._loaded[key] = self._loader.load(config, overrides)
+            except ConfigError as error:
+                self._loaded[key] = error
+        loaded = self._loaded[key]
+        if isinstance(loaded, LoadedConfig):
+            return loaded
+        for problem in loaded.problems:
+            fault = problem.what.partition(", not ")[0]  # without the value, which may be drawn
+            same = (problem.place(), problem.key, fault)
+            self._problems.setdefault(same, (problem, []))[1].append(name)
+        return None
+
+    def _naming(self, problem: ConfigProblem, jobs: Sequence[str], rows: int) -> ConfigProblem:
+        """The problem with the jobs that have it, unless these are simply all."""
+        if not self._study.changes and len(jobs) == rows:
+            return problem
+        others = f" and {len(jobs) - 1:,} more" if len(jobs) > 1 else ""
+        return replace(problem, what=f"{problem.what}; in the job {jobs[0]}{others}")
