@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from weathercoat.batch.names import NameStyle, is_url, model_name, safe_path
+from weathercoat.batch.names import is_url, model_name, safe_path
 from weathercoat.config.document import Item, decode, read_items, read_value, without_lines
 from weathercoat.config.load import Override
 from weathercoat.config.presets import preset_names
@@ -62,7 +62,7 @@ def is_manifest(path: str) -> bool:
     return os.path.splitext(path)[1].lower() in EXTENSIONS  # noqa: PTH122 (any text will do)
 
 
-def read_manifest(path: str, style: NameStyle = "stem") -> list[Row]:
+def read_manifest(path: str, style: str = "stem") -> list[Row]:
     """The rows of a manifest, named as they say, or else by their models.
 
     Raises ConfigError with all problems; those of the configs themselves are found when these are loaded.
@@ -105,7 +105,7 @@ def _has_model(entry: _Entry, refuse: _Refuse) -> bool:
     return len(given) == 1
 
 
-def _make_row(entry: _Entry, path: str, style: NameStyle, refuse: _Refuse) -> Row:
+def _make_row(entry: _Entry, path: str, style: str, refuse: _Refuse) -> Row:
     texts = entry.texts
     model = texts.get("model") or texts["asset"]
     folder = os.path.dirname(path)  # noqa: PTH120 (keeps a path as short as it was given)

@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import PurePath
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
+from weathercoat.batch.record import RECORD
 from weathercoat.errors import UsageError
 from weathercoat.output.folder import safe_name
 
-NameStyle = Literal["stem", "path"]
-RECORD = "batch.json"
+STYLES = ("stem", "path")
 PARTIAL = ".partial"  # ends the names of folders that are being written
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
@@ -35,7 +35,7 @@ def is_url(text: str) -> bool:
     return _URL.match(text) is not None
 
 
-def model_name(model: str, style: NameStyle = "stem") -> str:
+def model_name(model: str, style: str = "stem") -> str:
     """The name of a job whose model was named by itself: `chair` for `models/chair.obj`, or by `path`
     `models/chair.obj`, without a root and `..`.
     """
@@ -45,7 +45,7 @@ def model_name(model: str, style: NameStyle = "stem") -> str:
     return safe_path(path.parts if style == "path" else [path.stem])
 
 
-def found_name(folder: str, found: PurePath, style: NameStyle = "stem") -> str:
+def found_name(folder: str, found: PurePath, style: str = "stem") -> str:
     """The name of a job whose model was found below a folder: its path there without extension, or by `path`
     the whole one with it.
     """

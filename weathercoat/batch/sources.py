@@ -14,14 +14,14 @@ from weathercoat.batch.job import Job
 from weathercoat.batch.manifest import Row, is_manifest, read_manifest
 from weathercoat.batch.names import (
     PARTIAL,
-    RECORD,
+    STYLES,
     Named,
-    NameStyle,
     check_names,
     found_name,
     is_url,
     model_name,
 )
+from weathercoat.batch.record import RECORD
 from weathercoat.batch.study import Study, parse_study
 from weathercoat.config.load import ConfigLoader, LoadedConfig, Override
 from weathercoat.errors import ConfigError, ConfigProblem, LimitError, UsageError
@@ -41,7 +41,7 @@ def collect_jobs(
     matrix: Sequence[str] = (),
     vary: Sequence[str] = (),
     variants: int | None = None,
-    names: NameStyle = "stem",
+    names: str = "stem",
     null_separated: bool = False,
     stdin: BinaryIO | None = None,
     out: Path | None = None,
@@ -58,6 +58,8 @@ def collect_jobs(
     that name nothing, for two jobs with one name, and for a study that is none; ConfigError with all problems
     of all manifests or of all configs; LimitError for more than MOST_JOBS jobs.
     """
+    if names not in STYLES:
+        raise UsageError(f"names are made by {' or '.join(STYLES)}, not by {names}")
     study = parse_study(matrix, vary, variants)
     search = _Search(names, out)
     rows: list[Row] = []
@@ -87,7 +89,7 @@ def _taken(stdin: BinaryIO | None, argument: str, arguments: Sequence[str]) -> b
     return stdin.read()
 
 
-def _listed(data: bytes, style: NameStyle, null_separated: bool) -> Iterator[Row]:
+def _listed(data: bytes, style: str, null_separated: bool) -> Iterator[Row]:
     """A row for each model in a list; lines that are blank or begin with # are passed over."""
     if null_separated:
         items = [item for item in data.split(b"\0") if item]
@@ -106,7 +108,7 @@ def _listed(data: bytes, style: NameStyle, null_separated: bool) -> Iterator[Row
 class _Search:
     """Finds the models that arguments stand for, but not those that a batch or run has written."""
 
-    def __init__(self, style: NameStyle, out: Path | None) -> None:
+    def __init__(self, style: str, out: Path | None) -> None:
         self._style = style
         self._out = None if out is None else os.path.realpath(out)
         self._is_ours = cache(self._look)
