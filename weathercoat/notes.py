@@ -67,6 +67,11 @@ _TEXTS: dict[str, tuple[str, str]] = {
         "A piece has only one side, as a Möbius strip has, and was cut open along some edges.",
         "Nothing, unless the cut shows.",
     ),
+    "W-OBJECT": (
+        "Objects of a scene cannot be weathered (skinned, morphed, flattened or without faces) and stay as "
+        "they are; or a camera was passed over.",
+        "Export them as plain meshes where they should weather.",
+    ),
     "W-POLYGONS": ("Polygons with more than three corners were triangulated.", "Nothing."),
     "W-SELFINT": ("Faces cut through others; looked for by `inspect --self-intersections` only.", "Nothing."),
     "W-SKIN": (

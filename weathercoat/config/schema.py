@@ -31,7 +31,7 @@ VERSION = 1
 LARGEST_SEED = 2**63 - 1
 
 
-def _require_number(value: object) -> object:
+def require_number(value: object) -> object:
     """Pydantic would read true as 1 and "3" as 3; a config that says so is a mistake."""
     if isinstance(value, bool | str):
         raise ValueError("must be a number")
@@ -89,9 +89,9 @@ _SWITCH_SCHEMA = {"enum": [True, False, *_SWITCH]}
 _FORMAT_SCHEMA = {"type": "string", "enum": ["ply", "glb"]}
 
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
-Real = Annotated[float, BeforeValidator(_require_number)]
-Whole = Annotated[int, BeforeValidator(_require_number)]
-PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(_require_number)] | None
+Real = Annotated[float, BeforeValidator(require_number)]
+Whole = Annotated[int, BeforeValidator(require_number)]
+PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(require_number)] | None
 Switch = Annotated[bool, BeforeValidator(_parse_switch), WithJsonSchema(_SWITCH_SCHEMA)]
 Names = Annotated[
     tuple[str, ...],
@@ -407,10 +407,10 @@ class Appearance(Section):
 class Snapshots(Section):
     """When film and metal are recorded: a number of times, or explicit steps."""
 
-    count: Annotated[int, Field(ge=1, le=100_000), BeforeValidator(_require_number)] | None = parameter(
+    count: Annotated[int, Field(ge=1, le=100_000), BeforeValidator(require_number)] | None = parameter(
         5, "Number of snapshots, evenly spaced over the run and ending with it; not together with steps"
     )
-    steps: tuple[Annotated[int, Field(ge=0), BeforeValidator(_require_number)], ...] = parameter(
+    steps: tuple[Annotated[int, Field(ge=0), BeforeValidator(require_number)], ...] = parameter(
         (), "The steps to record instead, in rising order; 0 is the start"
     )
 

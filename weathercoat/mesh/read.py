@@ -58,7 +58,7 @@ def read_surface(
     path = Path(path)
     direction = _direction(up)
     try:
-        data = _load(path)
+        data = load_bytes(path)
         return _make_surface(data, path, name_of(path), format, direction, max_faces)
     except WeathercoatError as error:
         error.file = error.file or str(path)
@@ -101,8 +101,8 @@ def read_stream(
         raise
 
 
-def _load(path: Path) -> bytes:
-    """The bytes of a regular file; refuses everything else at once."""
+def load_bytes(path: Path) -> bytes:
+    """The bytes of a regular file; refuses everything else at once, with AccessError or LimitError."""
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):

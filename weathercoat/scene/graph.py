@@ -7,7 +7,7 @@ here reads or writes files.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any, Literal
 
@@ -98,7 +98,7 @@ class Scene:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     ground: float | None = None
     camera: CameraPath | None = None
-    config: str = "default"
+    config: str = "standard"
     overrides: Mapping[str, Any] = field(default_factory=dict)
     rules: tuple[Rule, ...] = ()
     source: GltfDocument | None = None
@@ -160,6 +160,18 @@ def decompose(transform: Vectors) -> tuple[Vectors, Vectors]:
     stretch = np.einsum("ji,j,jk->ik", right, lengths, right)
     scale = 10.0 ** (_STRETCH_DIGITS - 1 - np.floor(np.log10(lengths.max())))
     return turn, np.round(0.5 * (stretch + stretch.T) * scale) / scale + 0.0
+
+
+def world_surface(scene: Scene, thing: SceneObject) -> Surface:
+    """The surface of an object where it stands, its faces counter-clockwise seen from outside."""
+    surface = scene.meshes[thing.mesh]
+    faces = surface.faces[:, [0, 2, 1]] if thing.is_mirrored() else surface.faces
+    uv = surface.uv
+    if uv is not None and thing.is_mirrored():
+        uv = uv[:, [0, 2, 1]]
+    return replace(
+        surface, vertices=place(surface.vertices, thing.transform), faces=faces, uv=uv, up=scene.up
+    )
 
 
 def unique_names(paths: Sequence[Sequence[str]]) -> list[str]:

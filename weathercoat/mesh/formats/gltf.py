@@ -105,14 +105,18 @@ def _lost(document: GltfDocument) -> list[Note]:
         ("W-SKIN", len(document.json.get("skins", [])), "skins: skinned meshes are read unposed"),
         ("W-ANIMATION", len(document.json.get("animations", [])), "animations cannot be kept"),
         ("W-MORPH", targets, "primitives have morph targets, which cannot be kept"),
-        ("W-MATERIAL", document.missing_images(), "pictures are not beside the model"),
-        (
-            "W-UNKNOWN",
-            len(document.unknown),
-            f"properties that glTF does not know: {', '.join(document.unknown)[:200]}",
-        ),
     )
-    return [Note(code, count, text) for code, count, text in lost if count]
+    return [Note(code, count, text) for code, count, text in lost if count] + passed_over(document)
+
+
+def passed_over(document: GltfDocument) -> list[Note]:
+    """Notes on pictures that are missing, and on keys of what has been read that glTF does not know."""
+    unknown = f"properties that glTF does not know: {', '.join(document.unknown)[:200]}"
+    found = (
+        ("W-MATERIAL", document.missing_images(), "pictures are not beside the model"),
+        ("W-UNKNOWN", len(document.unknown), unknown),
+    )
+    return [Note(code, count, text) for code, count, text in found if count]
 
 
 def _add_mesh(

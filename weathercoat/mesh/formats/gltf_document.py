@@ -45,6 +45,8 @@ _MAX_ROTATION_ERROR = 0.02
 FLOATS = frozenset({(5126, False)})
 NORMALISED = frozenset({(5126, False), (5121, True), (5123, True)})
 UNSIGNED = frozenset({(5121, False), (5123, False), (5125, False)})
+# Transforms of a node in the order of `trs_matrices`, with their values where it has none.
+AT_REST = {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1], "scale": [1, 1, 1]}
 _KEYS = {
     kind: frozenset({*keys.split(), "name", "extensions", "extras"})
     for kind, keys in {
@@ -326,19 +328,42 @@ def node_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
         if node.keys() & {"translation", "rotation", "scale"}:
             raise CorruptError("a node has a matrix and another transform besides")
         return _numbers(node["matrix"], 16, "matrix").reshape(4, 4).T
-    x, y, z, w = _numbers(node.get("rotation", [0, 0, 0, 1]), 4, "rotation")
+    rest = {name: _numbers(node.get(name, value), len(value), name) for name, value in AT_REST.items()}
+    return trs_matrices(*(rest[name][None] for name in AT_REST))[0]
+
+
+def trs_matrices(
+    translation: NDArray[np.float64], rotation: NDArray[np.float64], scale: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Matrices (k, 4, 4) of translations (k, 3), rotations (k, 4) as x, y, z, w, and scales (k, 3).
+
+    Raises CorruptError for a rotation that is no unit quaternion.
+    """
+    x, y, z, w = rotation.T
     norm = x * x + y * y + z * z + w * w
-    if abs(norm - 1.0) > _MAX_ROTATION_ERROR:
-        raise CorruptError(f"the rotation {node['rotation']} of a node is no unit quaternion")
+    wrong = np.flatnonzero(~(np.abs(norm - 1.0) <= _MAX_ROTATION_ERROR))
+    if len(wrong):
+        raise CorruptError(f"the rotation {rotation[wrong[0]].tolist()} of a node is no unit quaternion")
     s = 2.0 / norm
-    result = np.eye(4)
-    result[:3, :3] = [
-        [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-        [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-        [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-    ]
-    result[:3, :3] *= _numbers(node.get("scale", [1, 1, 1]), 3, "scale")
-    result[:3, 3] = _numbers(node.get("translation", [0, 0, 0]), 3, "translation")
+    result = np.zeros((len(norm), 4, 4))
+    result[:, 0, 0], result[:, 0, 1], result[:, 0, 2] = (
+        1 - s * (y * y + z * z),
+        s * (x * y - z * w),
+        s * (x * z + y * w),
+    )
+    result[:, 1, 0], result[:, 1, 1], result[:, 1, 2] = (
+        s * (x * y + z * w),
+        1 - s * (x * x + z * z),
+        s * (y * z - x * w),
+    )
+    result[:, 2, 0], result[:, 2, 1], result[:, 2, 2] = (
+        s * (x * z - y * w),
+        s * (y * z + x * w),
+        1 - s * (x * x + y * y),
+    )
+    result[:, :3, :3] *= scale[:, None, :]
+    result[:, :3, 3] = translation
+    result[:, 3, 3] = 1.0
     return result
 
 
