@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from numba.core.errors import TypingError
 
-import weathercoat
+import weathercoat.lock
 from weathercoat.compile import cache_folder, kernel, remove_unused, watch_compiling
+from weathercoat.lock import FolderLock
 
 VALUE = 0.13691995878400012
 TRIAL = """
@@ -50,19 +54,24 @@ def environment(**changes: object) -> dict[str, str]:
     return {**kept, "PYTHONPATH": str(SOURCES.parent), "PYTHONDONTWRITEBYTECODE": "1", **added}
 
 
-def try_kernel(cwd: Path, **changes: object) -> int:
-    """Call a kernel in a process of its own; returns how many were compiled."""
-    done = subprocess.run(
-        [sys.executable, "-c", TRIAL],
-        env=environment(**changes),
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    value, compiled = done.stdout.split()
+def start_kernel(cwd: Path, **changes: object) -> subprocess.Popen[str]:
+    """A process of its own that calls a kernel."""
+    command = [sys.executable, "-c", TRIAL]
+    return subprocess.Popen(command, env=environment(**changes), cwd=cwd, stdout=subprocess.PIPE, text=True)
+
+
+def compiled_by(process: subprocess.Popen[str]) -> int:
+    """How many kernels a process of `start_kernel` compiled."""
+    said, _ = process.communicate()
+    assert process.returncode == 0
+    value, compiled = said.split()
     assert float(value) == pytest.approx(VALUE, abs=1e-15)
     return int(compiled)
+
+
+def try_kernel(cwd: Path, **changes: object) -> int:
+    """Call a kernel in a process of its own; returns how many were compiled."""
+    return compiled_by(start_kernel(cwd, **changes))
 
 
 def files_below(folder: Path) -> list[str]:
@@ -79,6 +88,99 @@ def test_kernels_are_kept_and_mended(tmp_path: Path) -> None:
     assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) >= 1
     assert kept.stat().st_size == whole
     assert try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path) == 0
+
+
+def test_processes_that_start_at_once_compile_each_kernel_once(tmp_path: Path) -> None:
+    alone = try_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path / "alone")
+    together = [start_kernel(tmp_path, NUMBA_CACHE_DIR=tmp_path / "together") for _ in range(3)]
+    assert sum(map(compiled_by, together)) == alone
+
+
+def doubling(name: str) -> Callable[[float], float]:
+    """A kernel that is kept with those of the package, as of a module `name`."""
+
+    def double(x: float) -> float:
+        return 2.0 * x
+
+    double.__module__ = f"weathercoat.{name}"
+    return kernel(double)
+
+
+def is_free(caches: Path) -> bool:
+    """Whether nobody has the turn to compile."""
+    lock = FolderLock(caches)
+    taken = lock.take()
+    lock.release(remove=False)
+    return taken
+
+
+def test_the_turn_to_compile_goes_back(caches: Path) -> None:
+    assert doubling("well")(1.0) == 2.0
+    assert is_free(caches)
+
+    def fail(x: float) -> float:
+        return x.no_such_attribute
+
+    fail.__module__ = "weathercoat.ill"
+    with pytest.raises(TypingError):
+        kernel(fail)(1.0)
+    assert is_free(caches)
+
+
+def test_the_turn_of_a_process_that_was_killed_goes_to_the_next(caches: Path) -> None:
+    script = (
+        "import sys, time; from pathlib import Path; from weathercoat.lock import FolderLock\n"
+        "lock = FolderLock(Path(sys.argv[1])); print(lock.take(), flush=True); time.sleep(600)"
+    )
+    command = [sys.executable, "-c", script, str(caches)]
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "True\n"
+        assert not is_free(caches)
+        process.kill()
+    assert doubling("killed")(1.0) == 2.0
+
+
+def test_a_turn_that_does_not_come_is_not_waited_for_without_end(
+    caches: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor silently: who watches learns that there is something to wait for."""
+    monkeypatch.setattr(weathercoat.compile, "_SECONDS_TO_WAIT", 0.1)
+    lock = FolderLock(caches)
+    assert lock.take()
+    begun: list[bool] = []
+    with watch_compiling(lambda: begun.append(True)) as compiling:
+        assert doubling("stopped")(1.0) == 2.0
+    assert (compiling.kernels, len(begun)) == (1, 1)
+    lock.release(remove=False)
+
+
+def test_a_kernel_that_another_process_compiles_meanwhile_is_taken(
+    caches: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As soon as it is there, although that process goes on with others."""
+    source = doubling("meanwhile")
+    assert source(1.0) == 2.0
+    (kept,) = caches.rglob("double-*.kernel")
+    content = kept.read_bytes()
+    kept.unlink()
+    lock = FolderLock(caches)
+    assert lock.take()
+    monkeypatch.setattr(time, "sleep", lambda seconds: kept.write_bytes(content))
+    with watch_compiling(lambda: None) as compiling:
+        assert doubling("meanwhile")(1.0) == 2.0
+    assert compiling.kernels == 0
+    lock.release(remove=False)
+
+
+def test_kernels_are_kept_where_the_file_system_has_no_locks(
+    caches: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(stream: object) -> None:
+        raise OSError(errno.ENOLCK, "no locks available")
+
+    monkeypatch.setattr(weathercoat.lock, "_lock", refuse)
+    assert doubling("unlocked")(1.0) == 2.0
+    assert list(caches.rglob("double-*.kernel"))
 
 
 def test_a_change_of_an_imported_source_is_noticed(tmp_path: Path) -> None:
@@ -236,12 +338,14 @@ def test_first_runs_at_once_do_not_trip_each_other(tmp_path: Path) -> None:
             "run", "standard", "sign.obj", "-o", name, *SMALL, cwd=tmp_path, cache=cache
         )
 
+    compiled: list[int] = []
     for process in [run("a"), run("b")]:
         _, said = process.communicate()
         assert process.returncode == 0, said
-        assert "weathercoat: compiling" in said and "weathercoat: compiled" in said
+        compiled += map(int, re.findall(r"weathercoat: compiled (\d+) kernels", said))
     _, said = run("c").communicate()
     assert "compil" not in said
+    assert sum(compiled) == len(list(cache.rglob("*.kernel"))), "each once"
     for other in ("b", "c"):
         assert files_below(tmp_path / "a") == files_below(tmp_path / other)
         for path in (tmp_path / "a").rglob("*.*"):

@@ -1,11 +1,12 @@
 """`kernel`: how every compiled function of the package is declared, and where its machine code is kept.
 
 Numba's own disk cache does not notice changes in functions that a kernel calls from another file, and two
-processes that compile at once can overwrite each other's entries. So each kernel is a file of its own, named
-by a hash of what it was made from (its signature, the processor, the versions of Python and Numba, and
-whether it checks its indices), in a folder named by a hash of the sources that its module is made from: its
-own and those of all modules of the package that it imports, directly or not. A file appears whole; who writes
-it last changes nothing.
+processes that compile at once can overwrite each other's entries. So each kernel is a file of its own,
+named by a hash of what it was made from (its signature, the processor, the versions of Python and Numba,
+and whether it checks its indices), in a folder named by a hash of the sources that its module is made from:
+its own and those of all modules of the package that it imports, directly or not. A file appears whole. One
+process at a time compiles, and the others wait for what they need, so that workers which start together
+compile each kernel once between them.
 
 The folders lie in the user's cache directory, so that a package which is installed read-only caches as well;
 `NUMBA_CACHE_DIR` names another place.
@@ -34,7 +35,10 @@ import numba.core.event
 import numba.np.linalg
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.serialize import dumps
+
+from weathercoat.lock import FolderLock
 
 
 def _take_blas_for_granted() -> None:
@@ -60,6 +64,9 @@ _IMPORT = re.compile(rb"^\s*(?:from|import) weathercoat\.([\w.]+)", re.MULTILINE
 _FOLDER = re.compile(r"[\w.]+-[0-9a-f]{16}")
 _DAY = 86_400.0
 _DAYS_KEPT = 30
+_SECONDS_BETWEEN_LOOKS = 0.02
+_SECONDS_TO_WAIT = 300.0  # for one kernel, lest a process that was stopped as it compiled stops all others
+_WAIT = "weathercoat:wait"  # the event of waiting for a kernel that another process compiles
 
 
 def cache_folder() -> Path | None:
@@ -96,6 +103,53 @@ def kernel_folder(module: str) -> Path | None:
     return base and base / f"{module}-{digest.hexdigest()[:16]}"
 
 
+class _Turn:
+    """The turn to compile, which one process at a time has.
+
+    It is one lock for all kernels: a kernel compiles those that it calls, and processes that held a lock a
+    kernel, taken in other orders, could wait for each other for ever. Numba's own lock keeps threads apart.
+    """
+
+    def __init__(self) -> None:
+        self._lock: FolderLock | None = None
+        self._depth = 0
+
+    def take(self) -> bool:
+        """Whether this process has the turn now; also where there is no place for a lock, or no lock."""
+        if self._lock is None:
+            folder = cache_folder()
+            if folder is None:
+                return True
+            lock = FolderLock(folder)
+            with suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+                if not lock.take():
+                    return False
+            self._lock = lock
+        return True
+
+    @contextmanager
+    def hold(self) -> Iterator[None]:
+        """Give the turn back at the end of the block in which it was taken, of nested ones the outermost."""
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._depth -= 1
+            if self._depth == 0 and self._lock is not None:
+                self._lock.release(remove=False)
+                self._lock = None
+
+
+_turn = _Turn()
+
+
+def _compile_in_turn(compile: Callable[[Any], Any], signature: Any) -> Any:
+    """Let Numba look for a kernel and compile it; a miss takes the turn, which goes back whatever happens."""
+    with global_compiler_lock, _turn.hold():
+        return compile(signature)
+
+
 class _KernelCache(NullCache):  # type: ignore[misc]
     """Keeps the machine code of one function, for Numba."""
 
@@ -115,6 +169,23 @@ class _KernelCache(NullCache):  # type: ignore[misc]
         path = self._path(sig, target_context.codegen())
         if path is None:
             return None
+        loaded = self._load(path, target_context)
+        return loaded or self._wait_for(path, target_context)
+
+    def _wait_for(self, path: Path, target_context: Any) -> CompileResult | None:
+        """The kernel once another process has compiled it; None when it is this one's turn to."""
+        until = time.monotonic() + _SECONDS_TO_WAIT
+        if not _turn.take():
+            with numba.core.event.trigger_event(_WAIT):
+                while not _turn.take() and time.monotonic() < until:
+                    time.sleep(_SECONDS_BETWEEN_LOOKS)
+                    loaded = self._load(path, target_context)
+                    if loaded is not None:
+                        return loaded
+        # who had the turn until now may have compiled it
+        return self._load(path, target_context)
+
+    def _load(self, path: Path, target_context: Any) -> CompileResult | None:
         # Compiling anew mends whatever is wrong with a file.
         with suppress(Exception):
             loaded = CompileResult._rebuild(target_context, *pickle.loads(path.read_bytes()))
@@ -159,26 +230,32 @@ def remove_unused() -> int:
 @dataclass
 class Compiling(numba.core.event.Listener):  # type: ignore[misc]
     """What was compiled: the number of kernels and the seconds that it took. `begun` is called before the
-    first.
+    first, or before the first that another process is waited for.
     """
 
     begun: Callable[[], None]
     kernels: int = 0
     seconds: float = 0.0
+    _has_begun: bool = False
     _depth: int = 0
     _started: float = 0.0
 
     def on_start(self, event: numba.core.event.Event) -> None:
         """Kernels are compiled within the kernels that call them; the outermost one's time counts."""
+        if not self._has_begun:
+            self._has_begun = True
+            self.begun()
+        if event.kind == _WAIT:
+            return
         if self._depth == 0:
-            if self.kernels == 0:
-                self.begun()
             self._started = time.perf_counter()
         self._depth += 1
         self.kernels += not event.data["dispatcher"].py_func.__module__.startswith("numba.")
 
     def on_end(self, event: numba.core.event.Event) -> None:
         """The end of what began last."""
+        if event.kind == _WAIT:
+            return
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.perf_counter() - self._started
@@ -188,7 +265,8 @@ class Compiling(numba.core.event.Listener):  # type: ignore[misc]
 def watch_compiling(begun: Callable[[], None]) -> Iterator[Compiling]:
     """Watch what the block compiles; `begun` is called before the first kernel."""
     compiling = Compiling(begun)
-    with numba.core.event.install_listener("numba:compile", compiling):
+    listen = numba.core.event.install_listener
+    with listen("numba:compile", compiling), listen(_WAIT, compiling):
         yield compiling
 
 
@@ -218,6 +296,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     package, _, module = function.__module__.partition(".")
     if package == __name__.partition(".")[0]:
         compiled._cache = _KernelCache(function, module)
+        compiled.compile = partial(_compile_in_turn, compiled.compile)
     return compiled  # type: ignore[no-any-return]
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.errors import ResumeError
+from weathercoat.lock import LOCK
 from weathercoat.output.checkpoints import SURFACE, Checkpoint, broken, read_checkpoint
 from weathercoat.output.folder import (
     CHECKPOINT,
@@ -27,7 +28,6 @@ from weathercoat.output.folder import (
     RunFolder,
     snapshot_stem,
 )
-from weathercoat.output.lock import LOCK
 from weathercoat.output.report import sha256, versions
 
 _FREE = ("ageing.steps", "ageing.duration", "snapshots.", "checkpoint.")  # keys that may differ

@@ -19,6 +19,7 @@ from weathercoat.cost import require_memory, require_memory_to_read
 from weathercoat.deform.parameters import DeformParameters
 from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError, printable
 from weathercoat.film.state import FilmParameters
+from weathercoat.lock import LOCK
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface, side_files
@@ -26,7 +27,6 @@ from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
 from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder, kept_in
-from weathercoat.output.lock import LOCK
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.report import (
     make_report,

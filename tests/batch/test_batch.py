@@ -15,8 +15,8 @@ from weathercoat.batch.batch import run_batch, sort_out
 from weathercoat.batch.job import Outcome
 from weathercoat.batch.processes import InlineExecutor
 from weathercoat.errors import OutputError
+from weathercoat.lock import FolderLock
 from weathercoat.mesh.shapes import make_random_sheet
-from weathercoat.output.lock import FolderLock
 from weathercoat.output.meshes import write_mesh
 
 

@@ -12,8 +12,8 @@ from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
 from weathercoat.batch.price import price_job
 from weathercoat.batch.record import Record
 from weathercoat.errors import AccessError, OutputError
+from weathercoat.lock import FolderLock
 from weathercoat.output.folder import REPORT, output_errors
-from weathercoat.output.lock import FolderLock
 from weathercoat.resume import fingerprint, missing_files
 from weathercoat.run import hash_inputs
 

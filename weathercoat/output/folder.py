@@ -35,8 +35,8 @@ from weathercoat.errors import (
     OutputError,
     OutputExistsError,
 )
+from weathercoat.lock import LOCK, FolderLock
 from weathercoat.output.exchange import exchange
-from weathercoat.output.lock import LOCK, FolderLock
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"

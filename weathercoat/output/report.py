@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from weathercoat import __version__
 from weathercoat.errors import AccessError, CheckError, Note
+from weathercoat.lock import LOCK
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
 from weathercoat.output.folder import REPORT, TIMING
-from weathercoat.output.lock import LOCK
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT_VERSION = 1

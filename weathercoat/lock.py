@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from pathlib import Path
 from typing import BinaryIO
 
 LOCK = "lock"
+_HELD = (errno.EAGAIN, errno.EACCES, errno.EDEADLK)  # what systems say of a lock that another process has
 
 
 class FolderLock:
@@ -22,14 +24,20 @@ class FolderLock:
         self._stream: BinaryIO | None = None
 
     def take(self) -> bool:
-        """Take the lock; False where another process has it. Raises OSError where there can be none."""
+        """Take the lock; False where another process has it.
+
+        Raises OSError where there can be none: the folder cannot be written, or its file system has no locks.
+        """
         stream = self._path.open("ab")
         try:
             _lock(stream)
             # who had it may have moved the folder away between the opening and the locking
             is_here = os.path.samestat(os.fstat(stream.fileno()), self._path.stat())
-        except OSError:
+        except OSError as error:
             is_here = False
+            if error.errno not in (*_HELD, errno.ENOENT):
+                stream.close()
+                raise
         if not is_here:
             stream.close()
             return False
@@ -45,6 +53,7 @@ class FolderLock:
         if remove:
             with contextlib.suppress(OSError):
                 self._path.unlink()
+        _unlock(self._stream)
         self._stream.close()
         self._stream = None
 
@@ -55,8 +64,15 @@ if os.name == "nt":
     def _lock(stream: BinaryIO) -> None:
         msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
 
+    def _unlock(stream: BinaryIO) -> None:
+        """Closing is enough: no process inherits the lock."""
+
 else:
     import fcntl
 
     def _lock(stream: BinaryIO) -> None:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def _unlock(stream: BinaryIO) -> None:
+        # closing would leave it to a process that was forked meanwhile
+        fcntl.flock(stream, fcntl.LOCK_UN)
