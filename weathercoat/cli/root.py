@@ -15,6 +15,7 @@ from weathercoat.memory import require_address_space
 
 SUBCOMMANDS = (
     "run",
+    "batch",
     "plan",
     "config",
     "sample",
