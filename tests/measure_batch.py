@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from weathercoat.config.load import load_config
@@ -39,7 +40,8 @@ def make_models(folder: Path, count: int) -> list[Path]:
     for number in range(count):
         maker = makers[number % len(makers)]
         path = folder / f"{maker.__name__.removeprefix('make_')}_{number:03d}.obj"
-        write_mesh(path, maker(edge_length=0.03 + 0.0001 * number))
+        surface = maker()
+        write_mesh(path, replace(surface, vertices=surface.vertices * (1.0 + 0.01 * number)))
         models.append(path)
     return models
 
@@ -66,6 +68,7 @@ def measure_speed(work: Path, count: int) -> None:
     models = make_models(folder, count)
     loaded = load_config("standard", SETTINGS)
     run_asset(loaded, models[0], work / "warm")
+    (work / "alone").mkdir()
     alone = 0.0
     for model in models:
         started = time.perf_counter()
