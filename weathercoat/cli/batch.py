@@ -224,7 +224,7 @@ class _Teller:
 def _as_dict(outcome: Outcome) -> dict[str, Any]:
     from dataclasses import asdict
 
-    return asdict(outcome)
+    return {**asdict(outcome), "seconds": round(outcome.seconds, 3)}
 
 
 def _line(outcome: Outcome) -> str:
