@@ -65,7 +65,9 @@ class Document:
 
     def write(self, path: Path, **more: Any) -> Path:
         """The document as a .gltf file with an embedded buffer, or a .glb."""
-        document = {**self.json, **more}
+        children = {child for node in self.json["nodes"] for child in node.get("children", [])}
+        tops = [i for i in range(len(self.json["nodes"])) if i not in children]
+        document = {**self.json, "scene": 0, "scenes": [{"nodes": tops}], **more}
         if path.suffix == ".gltf":
             uri = "data:application/octet-stream;base64," + base64.b64encode(self.body).decode()
             document["buffers"] = [{"byteLength": len(self.body), "uri": uri}]

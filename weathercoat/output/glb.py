@@ -74,7 +74,7 @@ def write_glb(
     """
     rotation = rotation_to_y(up)
     center = _center([sheet.vertices for node in nodes for sheet in node.sheets if len(sheet.faces)])
-    buffer = _Buffer(center, rotation)
+    buffer = GlbBuffer()
     root: dict[str, Any] = {"name": "model", "translation": [float(x) for x in rotation @ center]}
     entries: list[dict[str, Any]] = [root]
     meshes: list[dict[str, Any]] = []
@@ -86,7 +86,9 @@ def write_glb(
         for sheet in sheets:
             if sheet.material not in materials:
                 materials.append(sheet.material)
-            primitives.append({**buffer.add_sheet(sheet), "material": materials.index(sheet.material)})
+            primitives.append(
+                {**buffer.add_sheet(sheet, center, rotation), "material": materials.index(sheet.material)}
+            )
         if primitives:
             entry["mesh"] = len(meshes)
             meshes.append({"name": node.name, "primitives": primitives})
@@ -101,16 +103,11 @@ def write_glb(
     }
     if meshes:
         document["meshes"] = meshes
-        document["materials"] = [_material_entry(material) for material in materials]
+        document["materials"] = [material_entry(material) for material in materials]
         document["accessors"] = buffer.accessors
         document["bufferViews"] = buffer.views
         document["buffers"] = [{"byteLength": buffer.length}]
-    chunks = _frame(document, buffer.pieces)
-    if isinstance(target, (str, Path)):
-        with Path(target).open("wb") as stream:
-            stream.writelines(chunks)
-    else:
-        target.writelines(chunks)
+    write_document(target, document, buffer.pieces)
 
 
 def rotation_to_y(up: tuple[float, float, float]) -> Vectors:
@@ -132,22 +129,23 @@ def _center(clouds: list[Vectors]) -> Vectors:
     return 0.5 * (lowest + highest)
 
 
-class _Buffer:
-    """The binary chunk in the making, with its views and accessors."""
+class GlbBuffer:
+    """The binary chunk in the making, with its views and accessors: pieces of a multiple of 4 bytes each."""
 
-    def __init__(self, center: Vectors, rotation: Vectors) -> None:
-        self.center = center
-        self.rotation = rotation
+    def __init__(self) -> None:
         self.pieces: list[bytes] = []
         self.length = 0
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add_sheet(self, sheet: Sheet) -> dict[str, Any]:
-        """Add a sheet's arrays; the primitive that refers to them."""
-        normals = np.einsum("ij,nj->ni", self.rotation, sheet.normals)
+    def add_sheet(self, sheet: Sheet, center: Vectors, rotation: Vectors | None = None) -> dict[str, Any]:
+        """Add a sheet's arrays about `center` (3,), turned by `rotation` (3, 3); the primitive that refers
+        to them, without its material.
+        """
+        turn = np.eye(3) if rotation is None else rotation
+        normals = np.einsum("ij,nj->ni", turn, sheet.normals)
         normals[np.linalg.norm(normals, axis=1) < 0.5] = (0.0, 1.0, 0.0)
-        positions = np.einsum("ij,nj->ni", self.rotation, sheet.vertices - self.center)
+        positions = np.einsum("ij,nj->ni", turn, sheet.vertices - center)
         attributes = {
             "POSITION": self.add(positions, "VEC3", bounds=True),
             "NORMAL": self.add(normals, "VEC3"),
@@ -160,14 +158,19 @@ class _Buffer:
             attributes[name] = self.add(values, "SCALAR")
         return {"attributes": attributes, "indices": self.add_indices(sheet.faces)}
 
-    def add(self, values: NDArray[Any], kind: str, *, bounds: bool = False) -> int:
-        """Add 32-bit floats, with their bounds where the format asks for them; the accessor's number."""
+    def add(
+        self, values: NDArray[Any], kind: str, *, bounds: bool = False, target: int | None = VERTEX_TARGET
+    ) -> int:
+        """Add 32-bit floats, with their bounds where the format asks for them; the accessor's number.
+
+        target: None for what belongs to no vertices.
+        """
         stored = np.ascontiguousarray(values, "<f4")
         accessor = {"componentType": FLOAT, "count": len(stored), "type": kind}
         if bounds:
             accessor["min"] = [float(x) for x in stored.min(axis=0)]
             accessor["max"] = [float(x) for x in stored.max(axis=0)]
-        return self._append(stored.tobytes(), VERTEX_TARGET, accessor)
+        return self._append(stored.tobytes(), target, accessor)
 
     def add_indices(self, faces: Indices) -> int:
         """Add the corners of faces; the accessor's number."""
@@ -176,17 +179,22 @@ class _Buffer:
             content, INDEX_TARGET, {"componentType": UINT32, "count": 3 * len(faces), "type": "SCALAR"}
         )
 
-    def _append(self, content: bytes, target: int, accessor: dict[str, Any]) -> int:
-        self.views.append(
-            {"buffer": 0, "byteOffset": self.length, "byteLength": len(content), "target": target}
-        )
-        self.pieces.append(content)
-        self.length += len(content)
-        self.accessors.append({"bufferView": len(self.views) - 1, **accessor})
+    def add_bytes(self, content: bytes, **view: Any) -> int:
+        """Add bytes with a view of them, which gets the other entries given; the view's number."""
+        self.views.append({**view, "buffer": 0, "byteOffset": self.length, "byteLength": len(content)})
+        padded = content + bytes(-len(content) % 4)
+        self.pieces.append(padded)
+        self.length += len(padded)
+        return len(self.views) - 1
+
+    def _append(self, content: bytes, target: int | None, accessor: dict[str, Any]) -> int:
+        view = self.add_bytes(content) if target is None else self.add_bytes(content, target=target)
+        self.accessors.append({"bufferView": view, **accessor})
         return len(self.accessors) - 1
 
 
-def _material_entry(material: Material) -> dict[str, Any]:
+def material_entry(material: Material) -> dict[str, Any]:
+    """A material as glTF has it."""
     return {
         "name": material.name,
         "doubleSided": material.double_sided,
@@ -198,12 +206,19 @@ def _material_entry(material: Material) -> dict[str, Any]:
     }
 
 
-def _frame(document: dict[str, Any], pieces: list[bytes]) -> list[bytes]:
-    """The file: header, JSON chunk padded with spaces, binary chunk, whose pieces are multiples of 4
-    bytes."""
+def write_document(target: Path | str | BinaryIO, document: Mapping[str, Any], pieces: list[bytes]) -> None:
+    """Write a document and the pieces of its binary chunk as GLB; raises OSError.
+
+    The header and the JSON, padded with spaces, come first; pieces are multiples of 4 bytes.
+    """
     text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     length = sum(map(len, pieces))
     total = 12 + 8 + len(text) + (8 + length if pieces else 0)
-    head = [struct.pack("<4sII", b"glTF", 2, total), struct.pack("<I4s", len(text), b"JSON"), text]
-    return head + ([struct.pack("<I4s", length, b"BIN\0"), *pieces] if pieces else [])
+    chunks = [struct.pack("<4sII", b"glTF", 2, total), struct.pack("<I4s", len(text), b"JSON"), text]
+    chunks += [struct.pack("<I4s", length, b"BIN\0"), *pieces] if pieces else []
+    if isinstance(target, (str, Path)):
+        with Path(target).open("wb") as stream:
+            stream.writelines(chunks)
+    else:
+        target.writelines(chunks)

@@ -119,18 +119,14 @@ def write_snapshot_glb(
     _SEPARATION_AGE of the film and _RUST, _DIRT, _BARE of the metal. `up` is the model's axis against
     gravity. Raises OSError where the file cannot be written.
     """
-    metal = make_sheet(
-        METAL,
-        set_in(snapshot, hair(snapshot)),
-        snapshot.substrate_faces,
-        crease=METAL_CREASE,
-        colors=srgb_to_linear(snapshot.substrate_color),
-        scalars={"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
-    )
     others = [] if untouched is None else surface_nodes(untouched)
     write_glb(
         path,
-        [Node("film", _film_sheets(snapshot, thickness, back_color)), Node("substrate", [metal]), *others],
+        [
+            Node("film", film_sheets(snapshot, thickness, back_color)),
+            Node("substrate", [metal_sheet(snapshot)]),
+            *others,
+        ],
         up=up,
         extras={"step": int(snapshot.step), "age": float(snapshot.age)},
     )
@@ -146,10 +142,22 @@ def set_in(snapshot: Snapshot, depth: float) -> Vectors:
     return snapshot.substrate_vertices - depth * snapshot.substrate_normals
 
 
-def _film_sheets(
+def metal_sheet(snapshot: Snapshot) -> Sheet:
+    """The metal, a hair under the film, with its colours and scalars."""
+    return make_sheet(
+        METAL,
+        set_in(snapshot, hair(snapshot)),
+        snapshot.substrate_faces,
+        crease=METAL_CREASE,
+        colors=srgb_to_linear(snapshot.substrate_color),
+        scalars={"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
+    )
+
+
+def film_sheets(
     snapshot: Snapshot, thickness: float, back_color: tuple[float, float, float] | None
 ) -> list[Sheet]:
-    """The film's front, and where it has a thickness its back and rim."""
+    """The film's front, and where it has a thickness its back and rim; see `write_snapshot_glb`."""
     colors = srgb_to_linear(snapshot.film_color)
     scalars = {
         "_RUST": snapshot.film_rust,

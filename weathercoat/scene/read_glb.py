@@ -34,8 +34,8 @@ from weathercoat.mesh.repair import repair
 from weathercoat.mesh.surface import Surface
 from weathercoat.scene.cameras import animated_nodes, read_cameras
 from weathercoat.scene.graph import Scene, SceneObject, unique_names
+from weathercoat.scene.retained import INSTANCING
 
-INSTANCING = "EXT_mesh_gpu_instancing"
 # Shortest over longest axis of a transform below which what it places has no body.
 FLATTEST = 1e-6
 
@@ -118,7 +118,9 @@ class _Reader:
         extension = node.entry.get("extensions", {}).get(INSTANCING)
         if extension is None:
             return [(None, node.matrix)]
-        placed = np.einsum("ij,njk->nik", node.matrix, _instances(self.document, extension["attributes"]))
+        placed = np.einsum(
+            "ij,njk->nik", node.matrix, instance_matrices(self.document, extension["attributes"])
+        )
         return list(enumerate(placed))
 
     def _notes(self, nodes: Sequence[PlacedNode], objects: Sequence[SceneObject]) -> list[Note]:
@@ -163,7 +165,7 @@ def has_body(matrix: NDArray[np.float64]) -> bool:
     return bool(lengths[2] > FLATTEST * lengths[0])
 
 
-def _instances(document: GltfDocument, attributes: dict[str, int]) -> NDArray[np.float64]:
+def instance_matrices(document: GltfDocument, attributes: dict[str, int]) -> NDArray[np.float64]:
     """Matrices (n, 4, 4) of the instances of a node."""
     kinds = (
         ("TRANSLATION", "VEC3", FLOATS, [0.0, 0.0, 0.0]),
