@@ -128,7 +128,7 @@ def command(
         stdin=sys.stdin.buffer,
         out=Path(output),
     )
-    size = _pool_size(kind, workers)
+    size = pool_size(kind, workers)
     limit = memory_limit(max_memory)
     if dry_run:
         _say_price(found, output, size, limit, as_json=as_json)
@@ -136,11 +136,11 @@ def command(
     if limit is not None and kind == "processes":
         max_memory = round(limit.bytes)  # of all workers, which do not ask again while others are at work
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
-        teller = _Teller(messages, as_json=as_json)
+        teller = Teller(messages, as_json=as_json)
         record = run_batch(
             found,
             output,
-            _make_executor(kind, size, scheduler, limit),
+            make_executor(kind, size, scheduler, limit),
             workers=size,
             threads=options.threads_beside(size),
             check=check,
@@ -160,13 +160,13 @@ def command(
         raise BatchError(f"{len(failed)} of {len(found)} jobs failed: {listed}", file=output)
 
 
-def _pool_size(kind: str, workers: int | None) -> int:
+def pool_size(kind: str, workers: int | None) -> int:
     from weathercoat.deform.team import usable_cores
 
     return 1 if kind == "in-process" else workers or usable_cores()
 
 
-def _make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimit | None) -> Executor:
+def make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimit | None) -> Executor:
     from weathercoat.batch.processes import InlineExecutor, ProcessExecutor
 
     if kind == "in-process":
@@ -181,7 +181,7 @@ def _make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLim
     return ProcessExecutor(size, float("inf") if limit is None else limit.bytes)
 
 
-class _Teller:
+class Teller:
     """Tells of each event: a line for each job that has ended, and a bar over all work in between."""
 
     def __init__(self, messages: Any, *, as_json: bool) -> None:

@@ -16,6 +16,7 @@ from weathercoat.memory import require_address_space
 SUBCOMMANDS = (
     "run",
     "batch",
+    "scene",
     "plan",
     "config",
     "sample",

@@ -123,9 +123,8 @@ def make_display_mesh(
     if len(snapshot.film_faces):
         parts.append(_film(snapshot, normalise(snapshot.film_vertices), rest, film_thickness, paint))
     if untouched is not None and len(untouched.faces):
-        bare = ((untouched.faces, BARE_PART),)
-        parts.append(_part(normalise(untouched.vertices), bare, _METAL_CREASE))
-    return _joined(parts)
+        parts.append(make_bare_mesh(normalise(untouched.vertices), untouched.faces))
+    return join_meshes(parts)
 
 
 def _part(
@@ -191,8 +190,13 @@ def _film(
     return _part(shell.vertices, surfaces, _FILM_CREASE, scalars)
 
 
-def _joined(parts: list[DisplayMesh]) -> DisplayMesh:
-    """One mesh of several."""
+def make_bare_mesh(vertices: Vectors, faces: Indices) -> DisplayMesh:
+    """The display mesh of vertices (k, 3) and faces (t, 3) that carry no paint."""
+    return _part(vertices, ((faces, BARE_PART),), _METAL_CREASE)
+
+
+def join_meshes(parts: Sequence[DisplayMesh]) -> DisplayMesh:
+    """One mesh of several, one at least."""
     offsets = np.concatenate([[0], np.cumsum([len(part.vertices) for part in parts])])
     faces = [part.faces + np.int32(offset) for part, offset in zip(parts, offsets, strict=False)]
 

@@ -132,6 +132,25 @@ def render_snapshot(
         paint=to_linear(parameters.paint),
         untouched=untouched,
     )
+    placed = normalise(snapshot.substrate_vertices)
+    level = float((placed @ np.asarray(up, np.float64)).min()) - parameters.metal_thickness
+    radius = 1.6 * float(np.linalg.norm(placed, axis=1).max())
+    return render_mesh(mesh, camera, parameters, up=up, ground=(level, radius))
+
+
+def render_mesh(
+    mesh: DisplayMesh,
+    camera: Camera,
+    parameters: PictureParameters,
+    *,
+    up: Axis = _Y_UP,
+    ground: tuple[float, float],
+) -> Image:
+    """A picture of a display mesh, uint8 (height, width, 3).
+
+    ground: height along `up` of the invisible ground that shadows fall on, and the distance from the origin
+    at which they have faded; in display units, as are the mesh and the camera.
+    """
     rays = make_rays(mesh.vertices, mesh.faces)
     factor = parameters.samples
     width, height = parameters.width * factor, parameters.height * factor
@@ -144,14 +163,13 @@ def render_snapshot(
     picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
     coverage = _pixel_means((face >= 0).astype(np.float32).reshape(height, width, 1), factor)
-    placed = normalise(snapshot.substrate_vertices)
     shadow = ground_shadow(
         rays,
         camera,
         coverage[:, :, 0] < 1.0,
         up=upward,
-        level=float((placed @ upward).min()) - parameters.metal_thickness,
-        radius=1.6 * float(np.linalg.norm(placed, axis=1).max()),
+        level=ground[0],
+        radius=ground[1],
         key=key,
         reach=parameters.reach,
     )
