@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weathercoat.batch import sources
@@ -196,6 +196,7 @@ STEMS = st.lists(
 )  # fmt: skip
 
 
+@settings(max_examples=30)
 @given(STEMS, st.randoms(use_true_random=False))
 def test_a_job_is_the_same_whatever_else_is_there(stems: list[str], random: Any) -> None:
     """Same name, seed and drawn values beside other models and in another order."""

@@ -14,13 +14,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from weathercoat.batch.names import is_url, model_name, safe_path
 from weathercoat.config.document import Item, decode, read_items, read_value, without_lines
 from weathercoat.config.load import Override
 from weathercoat.config.presets import preset_names
-from weathercoat.config.schema import parameters, section_at
+from weathercoat.config.schema import parameters
 from weathercoat.config.wording import did_you_mean, nearest_key
 from weathercoat.errors import ConfigError, ConfigProblem
 
@@ -62,25 +62,27 @@ def is_manifest(path: str) -> bool:
     return os.path.splitext(path)[1].lower() in EXTENSIONS  # noqa: PTH122 (any text will do)
 
 
-def read_manifest(path: str, style: str = "stem") -> list[Row]:
-    """The rows of a manifest, named as they say, or else by their models.
-
-    Raises ConfigError with all problems; those of the configs themselves are found when these are loaded.
+def read_manifest(path: str, style: str = "stem") -> tuple[list[Row], list[ConfigProblem]]:
+    """The rows of a manifest, named as they say, or else by their models; and all that is wrong with it, but
+    for what is wrong with the configs themselves, which is found when these are loaded.
     """
-    data = _read(path)
+    rows: list[Row] = []
     problems: list[ConfigProblem] = []
 
     def refuse(line: int, key: str, what: str) -> None:
         problems.append(ConfigProblem(path, line, key, what))
 
     read = _read_csv if path.lower().endswith(".csv") else _read_yaml
-    entries = list(read(data, path, refuse))
-    rows = [_make_row(entry, path, style, refuse) for entry in entries if _has_model(entry, refuse)]
-    if not entries and not problems:
+    try:
+        for entry in read(_read(path), path, refuse):
+            row = _make_row(entry, path, style, refuse)
+            if row is not None:
+                rows.append(row)
+    except ConfigError as error:
+        problems += error.problems
+    if not rows and not problems:
         refuse(0, "", "holds no jobs")
-    if problems:
-        raise ConfigError(problems=tuple(sorted(problems, key=lambda problem: problem.line)))
-    return rows
+    return rows, problems
 
 
 _Refuse = Callable[[int, str, str], None]
@@ -98,16 +100,14 @@ def _read(path: str) -> bytes:
     return data
 
 
-def _has_model(entry: _Entry, refuse: _Refuse) -> bool:
-    given = [key for key in _MODEL if key in entry.texts]
-    if len(given) != 1:
-        refuse(entry.line, "model", "is given as asset too" if given else "is missing")
-    return len(given) == 1
-
-
-def _make_row(entry: _Entry, path: str, style: str, refuse: _Refuse) -> Row:
+def _make_row(entry: _Entry, path: str, style: str, refuse: _Refuse) -> Row | None:
+    """The row of an entry; None where its model or its config is not there."""
     texts = entry.texts
-    model = texts.get("model") or texts["asset"]
+    models = [texts[key] for key in _MODEL if key in texts]
+    if len(models) != 1:
+        refuse(entry.line, "model", "is given as asset too" if models else "is missing")
+        return None
+    (model,) = models
     folder = os.path.dirname(path)  # noqa: PTH120 (keeps a path as short as it was given)
     config = texts.get("config")
     if config is not None:
@@ -117,6 +117,7 @@ def _make_row(entry: _Entry, path: str, style: str, refuse: _Refuse) -> Row:
             if not os.path.lexists(file):
                 what = f"there is no file {file}, and no shipped config of that name"
                 refuse(entry.line, "config", what + did_you_mean(texts["config"], _presets()))
+                return None
     return Row(
         safe_path(texts["name"].split("/")) if "name" in texts else model_name(model, style),
         model if is_url(model) else os.path.join(folder, model),  # noqa: PTH118
@@ -137,6 +138,9 @@ def _read_yaml(data: bytes, path: str, refuse: _Refuse) -> Iterator[_Entry]:
     document = read_items(data, path, MOST_VALUES)
     defaults = _Entry(0, {}, ())
     if isinstance(document, dict):
+        if "jobs" not in document:
+            refuse(1, "", "has no jobs; where this is a config, give it with -c")
+            return
         for key in document.keys() - {"defaults", "jobs"}:
             known = did_you_mean(key, ["defaults", "jobs"])
             refuse(document[key].line, key, f"unknown key; a manifest has defaults and jobs{known}")
@@ -144,7 +148,7 @@ def _read_yaml(data: bytes, path: str, refuse: _Refuse) -> Iterator[_Entry]:
             defaults = _yaml_entry(document["defaults"], path, refuse) or defaults
             for key in defaults.texts.keys() & set(_OF_ONE_JOB):
                 refuse(defaults.line, f"defaults.{key}", "is a matter of each job")
-        document = document.get("jobs", Item(None, 0)).value
+        document = document["jobs"].value
     if not isinstance(document, list):
         refuse(1, "", "must be a list of jobs, or a mapping with such a list under jobs")
         return
@@ -164,14 +168,14 @@ def _yaml_entry(row: Item, path: str, refuse: _Refuse) -> _Entry | None:
         refuse(row.line, "", "must be a mapping with the key model, or the path of a model")
         return None
     for key, item in row.value.items():
-        if key == "seed":
-            overrides.append(Override("seed", without_lines(item.value), path, item.line))
+        if key == "seed" and item.value is not None:
+            overrides += _flattened({key: item}, "", path, refuse)
         elif key == "set":
             if isinstance(item.value, dict):
                 overrides += _flattened(item.value, "", path, refuse)
             elif item.value is not None:
                 refuse(item.line, key, "must be a mapping of the config's keys to values")
-        elif key not in _TEXTS:
+        elif key not in _ROW:
             hint = did_you_mean(key, _ROW) or "; values of the config go below set"
             refuse(item.line, key, f"unknown key{hint}")
         elif isinstance(item.value, str) and item.value:
@@ -187,7 +191,7 @@ def _flattened(values: Mapping[str, Item], above: str, path: str, refuse: _Refus
         key = f"{above}{name}"
         if not all(key.split(".")):
             refuse(item.line, key, "is no key of a config")
-        elif isinstance(item.value, dict) and section_at(tuple(key.split("."))) is not None:
+        elif isinstance(item.value, dict) and item.value:
             yield from _flattened(item.value, f"{key}.", path, refuse)
         else:
             yield Override(key, without_lines(item.value), path, item.line)
@@ -195,35 +199,44 @@ def _flattened(values: Mapping[str, Item], above: str, path: str, refuse: _Refus
 
 def _read_csv(data: bytes, path: str, refuse: _Refuse) -> Iterator[_Entry]:
     """The entries of a table with a head; an empty cell says nothing."""
-    text = decode(data, path)
-    lines = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-    value_of = _CellReader(path, refuse)
-    head: list[str] | None = None
+    lines = csv.reader(io.StringIO(decode(data, path), newline=""), skipinitialspace=True, strict=True)
+    value_of = cache(lambda cell: read_value(cell, path, ""))
+    head: list[str] = []
     while True:
         line = lines.line_num + 1
         try:
-            cells = next(lines)
+            cells = [cell.strip() for cell in next(lines)]
         except StopIteration:
             return
         except csv.Error as error:
             refuse(line, "", f"is no valid CSV: {error}")
             return
-        if not any(cell.strip() for cell in cells):
+        if not any(cells):
             continue
-        if head is None:
-            head = [cell.strip() for cell in cells]
+        if not head:
+            head = cells
             if not _is_head(head, line, refuse):
                 return
             continue
-        if len(cells) > len(head) and any(cells[len(head) :]):
-            refuse(line, "", f"has {len(cells)} cells, and the head has {len(head)}")
+        if any(cells[len(head) :]):
+            refuse(line, "", f"has {len(cells)} cells, and the first line {len(head)}")
             continue
-        given = {key: cell for key, cell in zip(head, cells, strict=False) if cell.strip()}
-        texts = {key: cell for key, cell in given.items() if key in _TEXTS}
-        keys = [key for key in given if key not in _TEXTS]
-        yield _Entry(
-            line, texts, tuple(Override(key, value_of(given[key], key, line), path, line) for key in keys)
-        )
+        texts: dict[str, str] = {}
+        overrides: list[Override] = []
+        for key, cell in zip(head, cells, strict=False):
+            if cell and key in _TEXTS:
+                texts[key] = cell
+            elif cell:
+                try:
+                    value = value_of(cell)
+                except ConfigError as error:
+                    refuse(line, key, error.problems[0].what)
+                    continue
+                if isinstance(value, dict):
+                    refuse(line, key, "is a mapping; give each of its keys a column")
+                else:
+                    overrides.append(Override(key, value, path, line))
+        yield _Entry(line, texts, tuple(overrides))
 
 
 def _is_head(head: Sequence[str], line: int, refuse: _Refuse) -> bool:
@@ -252,22 +265,3 @@ def _config_keys() -> frozenset[str]:
     """The dotted keys of the config, those of whole sections included."""
     keys = [parameter.key for parameter in parameters()]
     return frozenset(keys) | {key.rpartition(".")[0] for key in keys if "." in key}
-
-
-class _CellReader:
-    """Reads cells as YAML values, each text once."""
-
-    def __init__(self, path: str, refuse: _Refuse) -> None:
-        self._path = path
-        self._refuse = refuse
-        self._known: dict[str, Any] = {}
-
-    def __call__(self, text: str, key: str, line: int) -> Any:
-        if text not in self._known:
-            try:
-                self._known[text] = read_value(text, self._path, key)
-            except ConfigError as error:
-                for problem in error.problems:
-                    self._refuse(line, key, problem.what)
-                return None
-        return self._known[text]

@@ -22,13 +22,11 @@ from weathercoat.batch.names import (
     model_name,
 )
 from weathercoat.batch.record import RECORD
-from weathercoat.batch.study import Study, parse_study
+from weathercoat.batch.study import Study, check_count, parse_study
 from weathercoat.config.load import ConfigLoader, LoadedConfig, Override
-from weathercoat.errors import ConfigError, ConfigProblem, LimitError, UsageError
+from weathercoat.errors import ConfigError, ConfigProblem, UsageError
 from weathercoat.mesh.formats.sniff import FOREIGN, OWN
 from weathercoat.output.folder import REPORT
-
-MOST_JOBS = 100_000
 
 _EXTENSIONS = frozenset(f".{name}" for name in (*OWN, *FOREIGN))
 
@@ -63,30 +61,18 @@ def collect_jobs(
     study = parse_study(matrix, vary, variants)
     search = _Search(names, out)
     rows: list[Row] = []
-    problems: list[ConfigProblem] = []
     for argument in arguments:
-        try:
-            if argument == "-":
-                rows += _listed(_taken(stdin, argument, arguments), names, null_separated)
-            else:
-                rows += search.rows_of(argument)
-        except ConfigError as error:
-            problems += error.problems
-    if problems:
-        raise ConfigError(problems=tuple(problems))
-    if not rows:
+        if argument != "-":
+            rows += search.rows_of(argument)
+        elif stdin is None or arguments.count(argument) > 1:
+            raise UsageError("- stands for standard input, which is read once", remedy="give it once")
+        else:
+            rows += _listed(stdin.read(), names, null_separated)
+    if not arguments:
         raise UsageError("there are no jobs", remedy="name models, folders, globs or a manifest")
-    if len(rows) * study.size > MOST_JOBS:
-        what = f"asks for {len(rows) * study.size:,} jobs, the most is {MOST_JOBS:,}"
-        raise LimitError(what, remedy="make several batches")
+    check_count(len(rows) * study.size)
     check_names(Named(row.name, row.asset, row.place) for row in rows)
-    return _Studio(study, config, tuple(overrides)).jobs_of(rows)
-
-
-def _taken(stdin: BinaryIO | None, argument: str, arguments: Sequence[str]) -> bytes:
-    if stdin is None or arguments.count(argument) > 1:
-        raise UsageError("- stands for standard input, which is read once", remedy="give it once")
-    return stdin.read()
+    return _Studio(study, config, tuple(overrides)).jobs_of(rows, search.problems)
 
 
 def _listed(data: bytes, style: str, null_separated: bool) -> Iterator[Row]:
@@ -106,16 +92,20 @@ def _listed(data: bytes, style: str, null_separated: bool) -> Iterator[Row]:
 
 
 class _Search:
-    """Finds the models that arguments stand for, but not those that a batch or run has written."""
+    """Finds the models that arguments stand for, but not those that a batch or run has written.
+
+    problems: what is wrong with the manifests so far.
+    """
 
     def __init__(self, style: str, out: Path | None) -> None:
+        self.problems: list[ConfigProblem] = []
         self._style = style
         self._out = None if out is None else os.path.realpath(out)
         self._is_ours = cache(self._look)
 
     def rows_of(self, argument: str) -> list[Row]:
         """The rows of an argument other than `-`. Raises UsageError where it is a folder or a glob with no
-        model, and ConfigError for a manifest that is not valid.
+        model.
         """
         if not argument:
             raise UsageError("an argument is empty", remedy="name models, folders, globs or a manifest")
@@ -126,10 +116,15 @@ class _Search:
         if not os.path.lexists(argument) and glob.has_magic(argument):
             folder, found = self._matches(argument)
             return self._found(argument, folder, found)
-        return read_manifest(argument, self._style) if is_manifest(argument) else [self._named(argument)]
+        return self._read(argument) if is_manifest(argument) else [self._named(argument)]
 
     def _named(self, model: str) -> Row:
         return Row(model_name(model, self._style), model, model)
+
+    def _read(self, manifest: str) -> list[Row]:
+        rows, problems = read_manifest(manifest, self._style)
+        self.problems += problems
+        return rows
 
     def _found(self, argument: str, folder: str, found: list[PurePath]) -> list[Row]:
         if not found:
@@ -139,7 +134,7 @@ class _Search:
         for path in sorted(found, key=lambda path: path.parts):
             whole = os.path.join(folder, path)  # noqa: PTH118 (keeps the path as it was given)
             if is_manifest(whole):
-                rows += read_manifest(whole, self._style)
+                rows += self._read(whole)
             else:
                 rows.append(Row(found_name(folder, path, self._style), whole, argument))
         return rows
@@ -205,12 +200,16 @@ class _Studio:
         self._loaded: dict[tuple[str, str], LoadedConfig | ConfigError] = {}
         self._problems: dict[tuple[str, ...], tuple[ConfigProblem, list[str]]] = {}
 
-    def jobs_of(self, rows: Sequence[Row]) -> list[Job]:
-        """The jobs that the study makes of all rows. Raises ConfigError with the problems of all of them."""
+    def jobs_of(self, rows: Sequence[Row], problems: Sequence[ConfigProblem] = ()) -> list[Job]:
+        """The jobs that the study makes of all rows. Raises ConfigError with the problems of all configs, and
+        those that are known already.
+        """
         jobs = [job for row in rows for job in self._members_of(row)]
-        if self._problems:
-            found = self._problems.values()
-            raise ConfigError(problems=tuple(self._naming(*entry, len(rows)) for entry in found))
+        found = [*problems, *(self._naming(*entry, len(rows)) for entry in self._problems.values())]
+        if found:
+            raise ConfigError(
+                problems=tuple(sorted(found, key=lambda problem: (problem.where, problem.line)))
+            )
         return jobs
 
     def _members_of(self, row: Row) -> Iterator[Job]:

@@ -20,12 +20,15 @@ from weathercoat.batch.names import safe_path
 from weathercoat.config.document import read_value
 from weathercoat.config.load import Override
 from weathercoat.config.wording import did_you_mean, shortened
-from weathercoat.errors import UsageError
+from weathercoat.errors import LimitError, UsageError
+
+MOST_JOBS = 100_000
 
 _DIGITS = 9  # of a drawn number: where logarithms of two C libraries part, they part far behind
 _SEED_BITS = 53  # so that every reader of JSON keeps a seed whole
 _HASH_BITS = 128
 _CONFIG, _SEED = "config", "seed"
+_AROUND = "[]{}()\"'#"
 _PAIRS = {"(": ")", "[": "]", "{": "}"}
 
 
@@ -95,7 +98,7 @@ def parse_study(matrix: Sequence[str] = (), vary: Sequence[str] = (), variants: 
 
     matrix: `key=value,value`, values in YAML. vary: `key=uniform(a,b)`, `log(a,b)`, `normal(mean,deviation)`,
     `integer(a,b)` or `choice(value,value)`. Keys are those of the config, and `config` itself. Raises
-    UsageError, also ConfigError for a value that is no YAML.
+    UsageError, also ConfigError for a value that is no YAML, and LimitError for more than MOST_JOBS jobs.
     """
     if variants is not None and variants < 1:
         raise UsageError(f"--variants {variants}: there must be one at least", remedy="give a larger number")
@@ -104,12 +107,19 @@ def parse_study(matrix: Sequence[str] = (), vary: Sequence[str] = (), variants: 
     keys: set[str] = set()
     axes = [_parse_axis(text, keys) for text in matrix]
     draws = [_parse_draw(text, keys) for text in vary]
+    check_count(math.prod(len(axis) for _, axis in axes) * (variants or 1))
     combinations = []
     for values in itertools.product(*(axis for _, axis in axes)):
         pairs = [(key, value) for (key, _), value in zip(axes, values, strict=True)]
-        suffix = safe_path(["+".join(f"{key}_{value.text}" for key, value in pairs)]) if pairs else ""
+        suffix = _folder(pairs) if pairs else ""
         combinations.append(_member(suffix, pairs, "--matrix"))
     return Study(tuple(combinations), tuple(draws), variants)
+
+
+def check_count(jobs: int) -> None:
+    """Raise LimitError for more than MOST_JOBS jobs."""
+    if jobs > MOST_JOBS:
+        raise LimitError(f"asks for {jobs:,} jobs, the most is {MOST_JOBS:,}", remedy="make several batches")
 
 
 def _member(suffix: str, values: Sequence[tuple[str, _Value]], option: str) -> Member:
@@ -118,11 +128,17 @@ def _member(suffix: str, values: Sequence[tuple[str, _Value]], option: str) -> M
     return Member(suffix, config, tuple(overrides))
 
 
+def _folder(values: Sequence[tuple[str, _Value]]) -> str:
+    """The name of a combination: `curl.radius_0.1+config_rusting`; a list without its brackets."""
+    shown = (f"{key}_{''.join(value.text.split()).strip(_AROUND)}" for key, value in values)
+    return safe_path(["+".join(shown)])
+
+
 def _parse_axis(text: str, keys: set[str]) -> tuple[str, list[_Value]]:
     key, _, values = text.partition("=")
     _check_key(key, values, keys, f"--matrix {shortened(text)}", "key=value,value")
     axis = _values(values, key, f"--matrix {key}", "--matrix")
-    names = [safe_path([f"{key}_{value.text}"]).casefold() for value in axis]
+    names = [_folder([(key, value)]).casefold() for value in axis]
     for i, name in enumerate(names):
         if name in names[:i]:
             one, other = axis[names.index(name)].text, axis[i].text

@@ -87,6 +87,7 @@ class ConfigLoader:
     def __init__(self) -> None:
         self._files: dict[str, _Layer | ConfigError] = {}
         self._presets: dict[str, _Layer] = {}
+        self._fixed: dict[frozenset[str], frozenset[str]] = {}  # one of those that are equal is kept
 
     def load(
         self, path_or_preset: str | os.PathLike[str], overrides: Sequence[str | Override] = ()
@@ -114,11 +115,12 @@ class ConfigLoader:
         origins = {
             key: merge.origins.get(path, nowhere) for key, path in _resolved_keys(bool(config.remesh)).items()
         }
+        fixed = _fixed_keys(origins, layers)
         loaded = LoadedConfig(
             config,
             {key: sys.intern(str(origin)) for key, origin in origins.items()},
             source,
-            _fixed_keys(origins, layers),
+            self._fixed.setdefault(fixed, fixed),
         )
         if config.quality is None or config.quality == AUTO:
             return loaded

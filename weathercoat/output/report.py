@@ -103,12 +103,26 @@ def measure_snapshot(
 def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
     """Rest length of the edges between two faces of the film that came apart, and between film and lost
     film."""
+    ends, apart, at_loss = find_openings(snapshot)
+    places = snapshot.substrate_vertices[ends]
+    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    return 0.5 * float(length[apart].sum()), float(length[at_loss].sum())
+
+
+def find_openings(snapshot: Snapshot) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.intp]]:
+    """The half-edges of the film that lie at an opening.
+
+    The result: for each half-edge 3 f + i of the film's faces the vertices of the metal that it runs between
+    (3 m, 2); whether it has come apart from its twin (3 m,), which holds for both; the numbers of those whose
+    twin is lost.
+    """
     count = len(snapshot.substrate_vertices)
     faces = snapshot.film_faces
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     origin = snapshot.film_origin.astype(np.int64)
-    forward = origin[tail] * count + origin[head]
-    backward = origin[head] * count + origin[tail]
+    ends = np.stack([origin[tail], origin[head]], axis=1)
+    forward = ends[:, 0] * count + ends[:, 1]
+    backward = ends[:, 1] * count + ends[:, 0]
     order = np.argsort(forward, kind="stable")
     place, has_twin = _find(backward, forward[order])
     twin = order[place]
@@ -117,11 +131,7 @@ def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
     metal = snapshot.substrate_faces.astype(np.int64)
     metal_edges = np.sort((metal * count + np.roll(metal, -1, axis=1)).ravel())
     at_loss = np.flatnonzero(~has_twin)
-    at_loss = at_loss[_find(backward[at_loss], metal_edges)[1]]
-
-    ends = snapshot.substrate_vertices[origin[tail]], snapshot.substrate_vertices[origin[head]]
-    length = np.linalg.norm(ends[1] - ends[0], axis=1)
-    return 0.5 * float(length[apart].sum()), float(length[at_loss].sum())
+    return ends, apart, at_loss[_find(backward[at_loss], metal_edges)[1]]
 
 
 def measure_surface(surface: Surface) -> dict[str, Any]:
