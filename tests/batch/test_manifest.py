@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -284,3 +285,11 @@ def test_any_text_gives_jobs_or_a_message(name: str, pieces: list[str]) -> None:
         assert error.exit_code == 2 and error.lines()
     else:
         assert all(job.asset and job.name for job in jobs)
+
+
+@pytest.mark.parametrize("language", ["yaml", "csv"])
+def test_manifests_of_the_docs(language: str) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "batch.md").read_text(encoding="utf-8")
+    block, *_ = re.findall(rf"^```{language}\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    Path(f"jobs.{language}").write_text(block)
+    assert [job.name for job in collect_jobs([f"jobs.{language}"])][:2] == ["bracket", "street/stop"]
