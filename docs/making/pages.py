@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable, Iterator
 
 import weathercoat
@@ -13,6 +14,7 @@ from weathercoat.config.describe import reference_markdown
 from weathercoat.config.presets import preset_names, preset_path, preset_purpose
 from weathercoat.config.schema import parameters
 from weathercoat.notes import MEANINGS
+from weathercoat.scene.scene_file import scene_schema
 
 _ABOUT_PICTURES = f"""\
 This page is made by `make docs`: the tables from the schema, the pictures by ageing a plate or a bracket of
@@ -199,6 +201,11 @@ def _link(folder: object, name: str) -> str:
     return f"images/{str(folder).removeprefix(str(IMAGES))[1:]}/{name}"
 
 
+def scene_schema_file() -> str:
+    """The published JSON Schema of scene files."""
+    return json.dumps(scene_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "configuration.md": configuration_page,
     "errors.md": errors_page,
@@ -209,6 +216,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "stability.md": stability.stability_page,
     "independence.md": independence.independence_page,
     "python.md": python_page,
+    "../weathercoat/schemas/scene.json": scene_schema_file,
 }
 
 

@@ -14,7 +14,10 @@ from weathercoat.mesh import shapes
 from weathercoat.mesh.surface import Surface
 
 OPEN = {"plate", "curved-plate", "sheet"}
-GENUS = {"sphere": 0, "torus": 1, "pipe": 1, "barrel": 0, "box": 0, "sign": 4, "bracket": 4, "gear": 1}
+GENUS = {
+    "sphere": 0, "torus": 1, "pipe": 1, "barrel": 0, "box": 0, "sign": 4, "bracket": 4, "gear": 1,
+    "corrugated": 0,
+}  # fmt: skip
 
 
 def directed_edges(surface: Surface) -> np.ndarray:

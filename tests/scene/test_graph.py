@@ -61,6 +61,12 @@ def test_later_rules_win_and_values_add_up() -> None:
     assert scene.decision("post") == Rule("post", age=0.5, set={"seed": 1, "rust.rate": 2.0})
 
 
+def test_rules_match_paths_of_nodes_too() -> None:
+    drum = SceneObject("drum", "m", np.eye(4), path="shed/rack/drum")
+    scene = Scene("yard", {}, (drum,), rules=(Rule("shed/*", age=0.5), Rule("rack*", exposure=1.0)))
+    assert scene.decision("drum") == Rule("drum", age=0.5)
+
+
 def test_names_stay_short_until_they_repeat() -> None:
     paths = [("rack", "bolt"), ("shed", "bolt"), ("shed", "bolt"), ("sign",), ("shed", "bolt-2")]
     assert unique_names(paths) == ["rack/bolt", "shed/bolt", "shed/bolt-2", "sign", "bolt-2"]

@@ -13,24 +13,46 @@ import click
 from weathercoat.cli import options
 from weathercoat.cli.writing import WHERE, open_mesh, say_written
 
+_YARD = "yard"
+
 
 class _Shapes(click.Group):
-    """One command for each shape, its options made from the arguments of the function that makes it."""
+    """One command for each shape, its options made from the arguments of the function that makes it; and one
+    for a scene.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         from weathercoat.mesh.shapes import SHAPES
 
-        return list(SHAPES)
+        return [*SHAPES, _YARD]
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         from weathercoat.mesh.shapes import SHAPES
 
+        if name == _YARD:
+            return _yard
         return _make_command(name, SHAPES[name]) if name in SHAPES else None
 
 
 @click.group(cls=_Shapes)
 def command() -> None:
-    """Write a generated part to try the tool on."""
+    """Write a generated part, or a scene, to try the tool on."""
+
+
+@click.command(_YARD)
+@options.output("GLB file; the scene file gets its name with .yaml. Default: yard.glb.")
+@options.overwrite
+@options.as_json
+@options.debug
+def _yard(output: Path | None, overwrite: bool, as_json: bool) -> None:
+    """A scene: a shed with a roof, and a yard in front of it, of fifty painted parts.
+
+    Besides the GLB with its nodes and a camera that walks past, a scene file with rules is written.
+    """
+    from weathercoat.scene.yard import write_yard_files
+
+    for path in write_yard_files(output or Path("yard.glb"), overwrite=overwrite):
+        say_written(path, as_json=as_json)
 
 
 def _make_command(name: str, make: Callable[..., Any]) -> click.Command:

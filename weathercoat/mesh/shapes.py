@@ -255,6 +255,35 @@ def make_gear(
     return _named("gear", vertices + np.array([0.0, radius, 0.0]), faces)
 
 
+def make_corrugated_sheet(
+    width: Annotated[float, "extent along x, across the waves"] = 1.0,
+    height: Annotated[float, "extent along y"] = 1.2,
+    pitch: Annotated[float, "from wave to wave"] = 0.125,
+    depth: Annotated[float, "from the crest of a wave to its trough"] = 0.035,
+    thickness: Annotated[float, "thickness of the sheet"] = 0.008,
+    edge_length: Annotated[float, "longest edge, about"] = 0.03,
+) -> Surface:
+    """An upright corrugated sheet whose waves run up and down, facing +z."""
+    _require_positive(
+        width=width, height=height, pitch=pitch, depth=depth, thickness=thickness, edge_length=edge_length
+    )
+    across = min(edge_length, pitch / 10)
+    columns, rows = math.ceil(width / across), math.ceil(height / edge_length)
+    _require_few(4 * columns * rows)
+    turn = 2 * np.pi / pitch
+    if thickness / 2 >= 2 / (depth * turn**2):
+        raise UsageError("thickness must be below twice the radius of the waves: less depth or more pitch")
+    u, v, triangles = _grid(columns, rows)
+    flat, faces = _extrude(
+        np.stack([(u - 0.5) * width, v * height], axis=1), triangles, thickness, edge_length
+    )
+    x, y, offset = flat.T
+    slope = -0.5 * depth * turn * np.sin(turn * x)
+    along = np.hypot(1.0, slope)
+    x, z = x - offset * slope / along, 0.5 * depth * np.cos(turn * x) + offset / along
+    return _named("corrugated", np.stack([x, y, z], axis=1), faces)
+
+
 def make_random_sheet(
     faces: Annotated[int, "number of faces, met exactly"] = 10_000,
     width: Annotated[float, "extent along x"] = 1.0,
@@ -313,6 +342,7 @@ SHAPES: dict[str, Callable[..., Surface]] = {
     "sign": make_sign,
     "bracket": make_bracket,
     "gear": make_gear,
+    "corrugated": make_corrugated_sheet,
     "sheet": make_random_sheet,
 }
 

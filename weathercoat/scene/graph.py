@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -29,10 +30,10 @@ class SceneObject:
     """A mesh at its place.
 
     name: different from those of all other objects: the node's own, a path `rack/shelf` where names repeat,
-    and with a number behind it where paths do. mesh: key of `Scene.meshes`. transform: float64 (4, 4), mesh
-    to world; may scale unevenly and mirror. node: number of its node in `Scene.source`, or None; instance:
-    its number among those of a node that places a mesh many times. kept: why it cannot be weathered, such as
-    `it is skinned`; empty where it can.
+    and with a number behind it where paths do. path: names of all nodes down to it, with slashes. mesh: key
+    of `Scene.meshes`. transform: float64 (4, 4), mesh to world; may scale unevenly and mirror. node: number
+    of its node in `Scene.source`, or None; instance: its number among those of a node that places a mesh
+    many times. kept: why it cannot be weathered, such as `it is skinned`; empty where it can.
     """
 
     name: str
@@ -41,6 +42,7 @@ class SceneObject:
     node: int | None = None
     instance: int | None = None
     kept: str = ""
+    path: str = ""
 
     def is_mirrored(self) -> bool:
         """Whether the transform turns left into right, and so the faces' winding around."""
@@ -66,10 +68,10 @@ class CameraPath:
 class Rule:
     """What is decided for the objects whose names match; None and an empty `set` decide nothing.
 
-    pattern: glob over names of objects, in which * also stands for slashes. config: path or shipped name.
-    set: values of the config by dotted keys. age [ages]. variants: how many results the instances of one mesh
-    share, or `each` for one apiece. weathered: False leaves the object as it is. exposure: degree of
-    weathering, 0 to 1, instead of what is derived.
+    pattern: glob over names of objects, and over their paths, in which * also stands for slashes. config:
+    path or shipped name. set: values of the config by dotted keys. age [ages]. variants: how many results
+    the instances of one mesh share, or `each` for one apiece. weathered: False leaves the object as it is.
+    exposure: degree of weathering, 0 to 1, instead of what is derived.
     """
 
     pattern: str
@@ -104,15 +106,20 @@ class Scene:
     source: GltfDocument | None = None
     notes: tuple[Note, ...] = ()
 
+    @cached_property
+    def _paths(self) -> dict[str, str]:
+        return {thing.name: thing.path or thing.name for thing in self.objects}
+
     def decision(self, name: str) -> Rule:
-        """The rules that match the object of that name as one; its pattern is the name.
+        """The rules that match the object of that name, or its path, as one; its pattern is the name.
 
         Values of `set` are merged key by key.
         """
+        path = self._paths.get(name, name)
         merged: dict[str, Any] = {}
         values: dict[str, Any] = {}
         for rule in self.rules:
-            if not fnmatchcase(name, rule.pattern):
+            if not (fnmatchcase(name, rule.pattern) or fnmatchcase(path, rule.pattern)):
                 continue
             values.update(rule.set)
             for key in ("config", "age", "variants", "weathered", "exposure"):

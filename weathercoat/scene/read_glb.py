@@ -6,7 +6,7 @@ Source: Khronos, glTF 2.0 specification; EXT_mesh_gpu_instancing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +78,8 @@ class _Reader:
         if not objects:
             raise NoFacesError("the scene has no mesh with faces")
         named = [
-            SceneObject(unique, o.mesh, o.transform, o.node, o.instance, o.kept)
-            for unique, o in zip(unique_names(paths), objects, strict=True)
+            replace(thing, name=unique, path="/".join(path))
+            for unique, path, thing in zip(unique_names(paths), paths, objects, strict=True)
         ]
         camera, passed = read_cameras(self.document, nodes)
         notes += passed + self._notes(nodes, named) + passed_over(self.document)

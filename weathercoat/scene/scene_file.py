@@ -194,7 +194,9 @@ class Camera(Entry):
 class RuleEntry(Entry):
     """What is decided for the objects whose names match; the later rule wins."""
 
-    match: _Text = parameter(..., "Glob over names of objects; * stands for slashes too")
+    match: _Text = parameter(
+        ..., "Glob over names of objects and over paths of nodes; * stands for slashes too"
+    )
     config: _Text | None = parameter(None, "Shipped config, or a file relative to the scene file")
     set: dict[str, Any] = parameter({}, "Values of the config, by dotted keys or as sections")
     age: _Age | None = parameter(None, "How long the objects weather", unit="ages")

@@ -25,7 +25,8 @@ from weathercoat.output.folder import whole_file
 from weathercoat.output.glb import GlbBuffer, Material, Sheet, material_entry, rotation_to_y, write_document
 from weathercoat.output.sheets import surface_nodes
 from weathercoat.output.snapshots import film_sheets, metal_sheet
-from weathercoat.scene.graph import AgedMesh, CameraPath, Scene, SceneObject, place
+from weathercoat.scene.camera_node import add_camera
+from weathercoat.scene.graph import AgedMesh, Scene, SceneObject, place
 from weathercoat.scene.read_glb import instance_matrices
 from weathercoat.scene.retained import INSTANCING, retain
 
@@ -168,7 +169,7 @@ class _Writer:
         }
         if self.scene.camera is not None:
             tops.append(len(nodes))
-            _add_camera(document, self.buffer, self.scene.camera, np.array(self.scene.up))
+            add_camera(document, self.buffer, self.scene.camera, self.scene.up, _SECONDS_BETWEEN_VIEWS)
         if self.scene.up != (0.0, 1.0, 0.0):
             upright = np.eye(4)
             upright[:3, :3] = rotation_to_y(self.scene.up)
@@ -285,48 +286,3 @@ def _drop_instancing(document: dict[str, Any]) -> None:
 def _column_major(matrix: Vectors) -> list[float]:
     """A matrix (4, 4) as glTF has it."""
     return [float(x) for x in matrix.T.ravel()]
-
-
-def _add_camera(document: dict[str, Any], buffer: GlbBuffer, camera: CameraPath, up: Vectors) -> None:
-    """Add a node with the camera, and where it has a path an animation, a second from view to view."""
-    from scipy.spatial.transform import Rotation
-
-    backward = -camera.directions
-    level = np.where((np.abs(backward @ up) > 0.999)[:, None], np.roll(up, 1), up)
-    right = np.cross(level, backward)
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
-    axes = np.stack([right, np.cross(backward, right), backward], axis=2)
-    turns = Rotation.from_matrix(axes).as_quat()
-    # the shorter way from view to view
-    turns[1:] *= np.cumprod(np.where(np.sum(turns[1:] * turns[:-1], axis=1) < 0, -1.0, 1.0))[:, None]
-    lens = {
-        "yfov": float(np.radians(camera.field_of_view)),
-        "aspectRatio": camera.aspect,
-        "znear": 0.01,
-    }
-    document["cameras"] = [{"type": "perspective", "perspective": lens}]
-    node = {
-        "name": "camera",
-        "camera": 0,
-        "translation": camera.positions[0].tolist(),
-        "rotation": turns[0].tolist(),
-    }
-    document["nodes"].append(node)
-    if len(turns) == 1:
-        return
-    times = _SECONDS_BETWEEN_VIEWS * np.arange(len(turns))
-    key = buffer.add(times[:, None], "SCALAR", bounds=True, target=None)
-    target = len(document["nodes"]) - 1
-    paths = (("translation", camera.positions, "VEC3"), ("rotation", turns, "VEC4"))
-    document["animations"] = [
-        {
-            "name": "camera",
-            "channels": [
-                {"sampler": i, "target": {"node": target, "path": path}}
-                for i, (path, _, _) in enumerate(paths)
-            ],
-            "samplers": [
-                {"input": key, "output": buffer.add(values, kind, target=None)} for _, values, kind in paths
-            ],
-        }
-    ]
