@@ -262,6 +262,13 @@ class OutputExistsError(OutputError):
     remedy = "choose another folder with -o, or give --overwrite"
 
 
+class OutputBusyError(OutputError):
+    """Another process is writing the output."""
+
+    code = "E-BUSY"
+    remedy = "wait until it has ended, or choose another folder with -o"
+
+
 class ResumeError(OutputError):
     """What lies at the output is no part of the run that is asked for, so that it cannot go on from there."""
 
@@ -282,6 +289,13 @@ class WorkerError(BatchError):
 
     code = "E-WORKER"
     remedy = "give the job more memory, or run it alone to see what happens"
+
+
+class ClusterError(BatchError):
+    """A cluster cannot be reached, was lost, or cannot run the jobs; what is done is kept."""
+
+    code = "E-CLUSTER"
+    remedy = "see that the scheduler and its workers run, and run the batch again"
 
 
 def internal_error(error: Exception) -> WeathercoatError:

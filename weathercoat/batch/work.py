@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from weathercoat.batch.job import Outcome, Task
+from weathercoat.batch.job import Job, Outcome, Task
+from weathercoat.batch.storage import fetch, is_url, publish, read_report
 from weathercoat.errors import CorruptError, ResumeError, WeathercoatError, internal_error
+from weathercoat.mesh.read import name_of
+from weathercoat.output.report import sha256
+from weathercoat.resume import fingerprint
 from weathercoat.run import run_asset
 from weathercoat.sim.recorders import Patience
 
@@ -18,41 +25,90 @@ def do_task(
     """Run a task and return how it ended; only what stops the whole process is raised.
 
     What an interrupted run of the same job has left is gone on from; the result of another one, such as with
-    a config that has changed since, is replaced once the new one is whole.
+    a config that has changed since, is replaced once the new one is whole. Models and targets at URLs go
+    through temporary folders, so that there nothing is left to go on from; there, what is finished and
+    unchanged stays.
     """
     messages: list[str] = []
     started = time.perf_counter()
 
-    def run(*, resume: bool) -> Outcome:
-        report = run_asset(
-            task.job.loaded,
-            task.job.asset,
-            Path(task.target),
-            format=task.job.format,
-            resume=resume,
-            overwrite=not resume,
-            check=task.check,
-            threads=task.threads,
-            max_memory=task.max_memory,
-            progress=progress,
-            log=messages.append,
-            patience=patience,
-        )
-        figures = report["snapshots"][-1] if report["snapshots"] else None
-        return Outcome(task.job.name, "done", time.perf_counter() - started, figures, None, tuple(messages))
+    def run(model: str, out: Path) -> dict[str, Any]:
+        def attempt(*, resume: bool) -> dict[str, Any]:
+            return run_asset(
+                task.job.loaded,
+                model,
+                out,
+                format=task.job.format,
+                resume=resume,
+                overwrite=not resume,
+                check=task.check,
+                threads=task.threads,
+                max_memory=task.max_memory,
+                progress=progress,
+                log=messages.append,
+                patience=patience,
+            )
+
+        out.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            return attempt(resume=True)
+        except (ResumeError, CorruptError) as found:
+            if not _is_within(found.file, str(out)):
+                raise
+            return attempt(resume=False)
 
     try:
-        Path(task.target).parent.mkdir(parents=True, exist_ok=True)
-        try:
-            return run(resume=True)
-        except (ResumeError, CorruptError) as found:
-            if not _is_within(found.file, task.target):
-                raise
-            return run(resume=False)
+        with _model_here(task.job) as model:
+            report = _run_for_url(task, model, run) if is_url(task.target) else run(model, Path(task.target))
+        figures = report["snapshots"][-1] if report["snapshots"] else None
+        return Outcome(task.job.name, "done", time.perf_counter() - started, figures, None, tuple(messages))
     except Exception as raised:
         error = raised if isinstance(raised, WeathercoatError) else internal_error(raised)
         seconds = time.perf_counter() - started
         return Outcome(task.job.name, "failed", seconds, None, error.as_dict(), tuple(messages))
+
+
+@contextmanager
+def _model_here(job: Job) -> Iterator[str]:
+    """The path of a job's model; of one at a URL, that of a copy, in whose errors the URL stands."""
+    if not is_url(job.asset):
+        yield job.asset
+        return
+    with TemporaryDirectory(prefix="weathercoat-") as folder:
+        model = str(fetch(job.asset, Path(folder), job.format))
+        try:
+            yield model
+        except WeathercoatError as error:
+            if error.file == model:
+                error.file = job.asset
+            raise
+
+
+def _run_for_url(task: Task, model: str, run: Callable[[str, Path], dict[str, Any]]) -> dict[str, Any]:
+    """The report of the finished run at a task's URL, which is there already or is made."""
+    found = _finished(task, model)
+    if found is not None:
+        return found
+    with TemporaryDirectory(prefix="weathercoat-") as folder:
+        out = Path(folder, "run")
+        try:
+            report = run(model, out)
+        except BaseException as error:
+            error.__notes__ = []  # of what is kept in the temporary folder, which goes
+            raise
+        # who was taken for lost may have published it meanwhile
+        if _finished(task, model) is None:
+            publish(out, task.target)
+        return report
+
+
+def _finished(task: Task, model: str) -> dict[str, Any] | None:
+    """The report at a task's URL, where it is that of its job and of this version; else None."""
+    report = read_report(task.target)
+    if report is None or not report.get("snapshots"):
+        return None
+    inputs = {name_of(Path(model)): sha256(Path(model))}
+    return report if report.get("fingerprint") == fingerprint(task.job.loaded, inputs) else None
 
 
 def _is_within(file: str | None, target: str) -> bool:

@@ -32,6 +32,7 @@ from weathercoat.errors import (
     CheckError,
     CorruptError,
     FormatError,
+    OutputBusyError,
     OutputError,
     OutputExistsError,
 )
@@ -58,7 +59,7 @@ class RunFolder:
     An existing target is refused with OutputExistsError before any work; with `overwrite` or `resume` it is
     replaced at the end, and only if it holds the file `marker`, as the folder of a run does, or nothing.
     OutputError where the target cannot be written, also for a write that fails inside the block because the
-    disk is full, or where another process is writing it.
+    disk is full, and OutputBusyError where another process is writing it.
     """
 
     def __init__(
@@ -85,7 +86,7 @@ class RunFolder:
                     raise OutputError(reason, file=str(self.target), remedy="move it")
                 self.path.mkdir(exist_ok=True)
                 if not self._lock.take():
-                    raise OutputError("another process is writing it", file=str(self.target))
+                    raise OutputBusyError("another process is writing it", file=str(self.target))
             if not self.resume:
                 if not self.overwrite:
                     self._check_interrupted()
