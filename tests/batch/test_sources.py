@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weathercoat.batch import sources
+from weathercoat.batch import loading
 from weathercoat.batch.job import Job
 from weathercoat.batch.sources import collect_jobs
 from weathercoat.config.load import ConfigLoader, LoadedConfig, Override, load_config
-from weathercoat.errors import ConfigError, LimitError, UsageError
+from weathercoat.errors import ConfigError, LimitError, OutputExistsError, UsageError
 
 
 @pytest.fixture
@@ -129,6 +129,11 @@ def test_standard_input_that_gives_nothing(arguments: list[str], data: bytes | N
         collect_jobs(arguments, stdin=None if data is None else io.BytesIO(data))
 
 
+def test_nul_without_a_list() -> None:
+    with pytest.raises(UsageError, match="-0 is about"):
+        collect_jobs(["oak.obj"], null_separated=True)
+
+
 def test_two_jobs_with_one_name_are_refused() -> None:
     with pytest.raises(UsageError, match=r"oak \(a/oak.obj\) and Oak \(b/Oak.ply\)") as caught:
         collect_jobs(["a/oak.obj", "b/Oak.ply"])
@@ -153,6 +158,16 @@ def test_names_stay_clear_of_what_a_batch_writes() -> None:
     ]
 
 
+def test_results_of_other_batches_are_not_built_upon(lay: Callable[..., None]) -> None:
+    """`oak` would take `oak/v0000` along when it is replaced."""
+    lay("out/oak/run.json")
+    for study in ({"variants": 1}, {"matrix": ["seed=1"]}):
+        with pytest.raises(OutputExistsError, match="result of a job oak"):
+            collect_jobs(["elm.obj", "oak.obj"], out=Path("out"), **study)
+    collect_jobs(["elm.obj", "oak.obj"], out=Path("out"))
+    collect_jobs(["elm.obj"], out=Path("out"), variants=1)
+
+
 def test_a_config_is_loaded_once(monkeypatch: pytest.MonkeyPatch) -> None:
     loads = []
 
@@ -161,7 +176,7 @@ def test_a_config_is_loaded_once(monkeypatch: pytest.MonkeyPatch) -> None:
             loads.append(arguments)
             return super().load(*arguments)
 
-    monkeypatch.setattr(sources, "ConfigLoader", Counting)
+    monkeypatch.setattr(loading, "ConfigLoader", Counting)
     jobs = collect_jobs([f"{i}.obj" for i in range(200)], overrides=["curl.radius=0.2"])
     assert len(loads) == 1
     assert len({id(job.loaded) for job in jobs}) == 1

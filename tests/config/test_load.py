@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from weathercoat.config.load import Override, load_config
+from weathercoat.config.load import ConfigLoader, Override, load_config
 from weathercoat.config.presets import preset_names
 from weathercoat.config.schema import Config, Remesh
 from weathercoat.errors import ConfigError
@@ -239,3 +239,26 @@ def test_any_mix_of_overrides_loads_or_names_its_problems(mix: list[tuple[str, s
         assert all(problem.what for problem in error.problems)
     else:
         assert Config.model_validate(loaded.config.as_dict()) == loaded.config
+
+
+def test_a_loader_reads_each_file_once(write: Callable[[str], str]) -> None:
+    """And gives what `load_config` gives, also of a preset and of a file that is not valid."""
+    path = write("preset: literal\nseed: 5\n")
+    loader = ConfigLoader()
+    cases: list[list[str]] = [[], ["seed=6", "preset=rusting"], ["quality=draft"], ["remesh=off"], []]
+    wanted = [load_config(path, overrides) for overrides in cases]
+    assert loader.load(path) == wanted[0]
+    write("seed: 99\n")
+    assert [loader.load(path, overrides) for overrides in cases] == wanted
+    write("a: [")
+    for _ in range(2):
+        with pytest.raises(ConfigError):
+            loader.load("./c.yaml")
+
+
+def test_an_override_from_a_line_of_a_file(write: Callable[[str], str]) -> None:
+    override = Override("curl.radius", 0.1, "jobs.csv", 7)
+    assert load_config(write(""), [override]).origins["curl.radius"] == "jobs.csv:7"
+    with pytest.raises(ConfigError) as caught:
+        load_config("c.yaml", [override._replace(value=-1)])
+    assert caught.value.problems[0].place() == "jobs.csv:7"

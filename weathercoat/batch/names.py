@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from pathlib import PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import NamedTuple
 
 from weathercoat.batch.record import RECORD
-from weathercoat.errors import UsageError
-from weathercoat.output.folder import safe_name
+from weathercoat.errors import OutputExistsError, UsageError
+from weathercoat.output.folder import REPORT, safe_name
 
 STYLES = ("stem", "path")
 PARTIAL = ".partial"  # ends the names of folders that are being written
@@ -87,6 +87,20 @@ def check_names(jobs: Iterable[Named]) -> None:
             if outer is not None:
                 what = f"the results of {_shown(job)} would lie within those of {_shown(outer)}"
                 raise UsageError(what, remedy=_REMEDY)
+
+
+def check_room(jobs: Iterable[str], out: Path) -> None:
+    """Raise OutputExistsError where the folder of a job would lie within the result of an earlier one, which
+    would take it along when it is replaced.
+    """
+    above = dict.fromkeys(parent for job in jobs for parent in PurePosixPath(job).parents if parent.parts)
+    for parent in above:
+        folder = out / parent
+        if (folder / REPORT).is_file():
+            what = f"is the result of a job {parent}, in which others would lie now"
+            raise OutputExistsError(
+                what, file=str(folder), remedy="choose another folder with -o, or remove it"
+            )
 
 
 _REMEDY = "give --names path, or names in a manifest"

@@ -5,26 +5,27 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cache
 from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from weathercoat.batch.job import Job
+from weathercoat.batch.loading import load_jobs
 from weathercoat.batch.manifest import Row, is_manifest, read_manifest
 from weathercoat.batch.names import (
     PARTIAL,
     STYLES,
     Named,
     check_names,
+    check_room,
     found_name,
     is_url,
     model_name,
 )
 from weathercoat.batch.record import RECORD
-from weathercoat.batch.study import Study, check_count, parse_study
-from weathercoat.config.load import ConfigLoader, LoadedConfig, Override
-from weathercoat.errors import ConfigError, ConfigProblem, UsageError
+from weathercoat.batch.study import check_count, parse_study
+from weathercoat.config.load import Override
+from weathercoat.errors import ConfigProblem, UsageError
 from weathercoat.mesh.formats.sniff import FOREIGN, OWN
 from weathercoat.output.folder import REPORT
 
@@ -54,7 +55,8 @@ def collect_jobs(
 
     A model that does not exist is no error here: its job will fail by itself. Raises UsageError for arguments
     that name nothing, for two jobs with one name, and for a study that is none; ConfigError with all problems
-    of all manifests or of all configs; LimitError for more than MOST_JOBS jobs.
+    of all manifests and configs; LimitError for more than `study.MOST_JOBS` jobs; and OutputExistsError where
+    a result in `out` is in the way.
     """
     if names not in STYLES:
         raise UsageError(f"names are made by {' or '.join(STYLES)}, not by {names}")
@@ -70,9 +72,16 @@ def collect_jobs(
             rows += _listed(stdin.read(), names, null_separated)
     if not arguments:
         raise UsageError("there are no jobs", remedy="name models, folders, globs or a manifest")
+    if null_separated and "-" not in arguments:
+        raise UsageError(
+            "-0 is about a list on standard input", remedy="add - to the arguments, or leave it out"
+        )
     check_count(len(rows) * study.size)
     check_names(Named(row.name, row.asset, row.place) for row in rows)
-    return _Studio(study, config, tuple(overrides)).jobs_of(rows, search.problems)
+    jobs = load_jobs(rows, study, config, overrides, search.problems)
+    if out is not None:
+        check_room((job.name for job in jobs), out)
+    return jobs
 
 
 def _listed(data: bytes, style: str, null_separated: bool) -> Iterator[Row]:
@@ -187,68 +196,3 @@ class _Search:
 
 def _is_model(name: str) -> bool:
     return os.path.splitext(name)[1].lower() in _EXTENSIONS  # noqa: PTH122
-
-
-class _Studio:
-    """Makes jobs of rows, loads each distinct config once, and collects what is wrong with any."""
-
-    def __init__(self, study: Study, config: str, overrides: tuple[str | Override, ...]) -> None:
-        self._study = study
-        self._config = config
-        self._overrides = overrides
-        self._loader = ConfigLoader()
-        self._loaded: dict[tuple[str, str], LoadedConfig | ConfigError] = {}
-        self._problems: dict[tuple[str, ...], tuple[ConfigProblem, list[str]]] = {}
-
-    def jobs_of(self, rows: Sequence[Row], problems: Sequence[ConfigProblem] = ()) -> list[Job]:
-        """The jobs that the study makes of all rows. Raises ConfigError with the problems of all configs, and
-        those that are known already.
-        """
-        jobs = [job for row in rows for job in self._members_of(row)]
-        found = [*problems, *(self._naming(*entry, len(rows)) for entry in self._problems.values())]
-        if found:
-            raise ConfigError(
-                problems=tuple(sorted(found, key=lambda problem: (problem.where, problem.line)))
-            )
-        return jobs
-
-    def _members_of(self, row: Row) -> Iterator[Job]:
-        for member in self._study.combinations:
-            name = f"{row.name}/{member.suffix}" if member.suffix else row.name
-            config = member.config or row.config or self._config
-            overrides = (*row.overrides, *self._overrides, *member.overrides)
-            loaded = self._load(name, config, overrides)
-            if loaded is None:
-                continue
-            if self._study.variants is None:
-                yield Job(name, row.asset, loaded, row.format)
-                continue
-            for variant in self._study.drawn(loaded.config.seed, name):
-                own = f"{name}/{variant.suffix}"
-                drawn = self._load(own, variant.config or config, (*overrides, *variant.overrides))
-                if drawn is not None:
-                    yield Job(own, row.asset, drawn, row.format)
-
-    def _load(self, name: str, config: str, overrides: tuple[str | Override, ...]) -> LoadedConfig | None:
-        """The config of a job, or None where it is not valid."""
-        key = (config, repr(overrides))
-        if key not in self._loaded:
-            try:
-                self._loaded[key] = self._loader.load(config, overrides)
-            except ConfigError as error:
-                self._loaded[key] = error
-        loaded = self._loaded[key]
-        if isinstance(loaded, LoadedConfig):
-            return loaded
-        for problem in loaded.problems:
-            fault = problem.what.partition(", not ")[0]  # without the value, which may be drawn
-            same = (problem.place(), problem.key, fault)
-            self._problems.setdefault(same, (problem, []))[1].append(name)
-        return None
-
-    def _naming(self, problem: ConfigProblem, jobs: Sequence[str], rows: int) -> ConfigProblem:
-        """The problem with the jobs that have it, unless these are simply all."""
-        if not self._study.changes and len(jobs) == rows:
-            return problem
-        others = f" and {len(jobs) - 1:,} more" if len(jobs) > 1 else ""
-        return replace(problem, what=f"{problem.what}; in the job {jobs[0]}{others}")
