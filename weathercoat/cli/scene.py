@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -13,6 +13,20 @@ from weathercoat.errors import BatchError
 
 if TYPE_CHECKING:
     from weathercoat.scene.plan import ScenePlan
+
+_EACH = "each"
+_MOST_VARIANTS = 10_000
+
+
+class _Variants(click.ParamType):
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == _EACH or isinstance(value, int):
+            return value
+        if not value.isdecimal() or not 1 <= int(value) <= _MOST_VARIANTS:
+            self.fail(f"must be each, or a whole number from 1 to {_MOST_VARIANTS:,}", param, ctx)
+        return int(value)
 
 
 @click.command()
@@ -30,6 +44,10 @@ if TYPE_CHECKING:
 @click.option(
     "--age", type=click.FloatRange(0, 1000), metavar="AGES",
     help="How long objects have been exposed whose rules do not tell; ageing.duration by default.",
+)  # fmt: skip
+@click.option(
+    "--variants", type=_Variants(), metavar="N",
+    help="How many results the instances of a mesh share whose rules do not tell, or each.",
 )  # fmt: skip
 @options.seed
 @options.quality
@@ -52,6 +70,7 @@ def command(
     workers: int | None,
     assignments: tuple[str, ...],
     age: float | None,
+    variants: int | Literal["each"] | None,
     seed: int | None,
     quality: str | None,
     dry_run: bool,
@@ -83,7 +102,7 @@ def command(
     from weathercoat.scene.report import table_lines
 
     out = output or Path(f"{scene.stem}-aged")
-    choices = Choices(config, [*assignments, *options.shortcuts(quality=quality)], age, seed)
+    choices = Choices(config, [*assignments, *options.shortcuts(quality=quality)], age, seed, variants)
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
         with report_compiling(messages.log):
             read = read_scene(scene)

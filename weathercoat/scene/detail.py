@@ -13,7 +13,9 @@ from weathercoat.mesh.surface import Surface, Vectors, face_areas
 from weathercoat.scene.exposure import sample_surface
 from weathercoat.scene.graph import CameraPath, Scene, SceneObject, place
 
-SAMPLES = 1536  # of an object's surface
+# Of an object's surface: the second number where the first leaves the distance open by more than a share.
+SAMPLES = (1536, 24_576)
+_OPEN_SHARE = 0.2
 # How far, in mean distances between samples, a point of the surface may lie from the nearest sample.
 _COVERAGE = 1.5
 _LEAST = 1e-6  # sizes: a camera that touches an object is this far away
@@ -44,24 +46,29 @@ def pixels_per_unit(camera: CameraPath, distance: float) -> float:
 
 
 def _nearest(surface: Surface, item: SceneObject, camera: CameraPath) -> float | None:
-    points, _ = sample_surface(surface, item, SAMPLES)
     vertices = place(surface.vertices, item.transform)
     area = float(face_areas(vertices, surface.faces).sum())
-    spacing = _COVERAGE * float(np.sqrt(area / SAMPLES))
-    from_samples = np.array(
-        [
-            _shown_distance(points, position, direction, camera, spacing)
-            for position, direction in zip(camera.positions, camera.directions, strict=True)
-        ]
-    )
-    shown = np.flatnonzero(np.isfinite(from_samples))
-    if not len(shown):
-        return None
-    tree = make_closest_tree(vertices, surface.faces)
-    _, near = find_closest(tree, camera.positions[shown], np.zeros(len(shown), np.int32))
-    exact = np.linalg.norm(near - camera.positions[shown], axis=1)
-    distance = float(np.maximum(exact, from_samples[shown] - spacing).min())
-    return max(distance, _LEAST * float(np.sqrt(area)))
+    distance: float | None = None
+    for samples in SAMPLES:
+        spacing = _COVERAGE * math.sqrt(area / samples)
+        points, _ = sample_surface(surface, item, samples)
+        from_samples = np.array(
+            [
+                _shown_distance(points, position, direction, camera, spacing)
+                for position, direction in zip(camera.positions, camera.directions, strict=True)
+            ]
+        )
+        shown = np.flatnonzero(np.isfinite(from_samples))
+        if not len(shown):
+            return None
+        tree = make_closest_tree(vertices, surface.faces)
+        _, near = find_closest(tree, camera.positions[shown], np.zeros(len(shown), np.int32))
+        exact = np.linalg.norm(near - camera.positions[shown], axis=1)
+        distance = float(np.maximum(exact, from_samples[shown] - spacing).min())
+        if spacing <= _OPEN_SHARE * distance:
+            break
+    assert distance is not None
+    return max(distance, _LEAST * math.sqrt(area))
 
 
 def _shown_distance(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from weathercoat.plan import Plan, make_plan
 from weathercoat.run import split_paint
 from weathercoat.scene.detail import UNSEEN, nearest_distances
 from weathercoat.scene.exposure import measure_exposure
-from weathercoat.scene.graph import Rule, Scene, place
+from weathercoat.scene.graph import Rule, Scene, SceneObject, place
 from weathercoat.scene.groups import Member, Variant, group_members, placement_of
 from weathercoat.scene.weathering import SPLASH_HEIGHT, Weathering, weather, weathered_config, with_values
 
@@ -31,13 +31,15 @@ MODELS = "models"  # folder of the surfaces that variants age
 @dataclass(frozen=True)
 class Choices:
     """What the command line says. config: instead of the scene's own. overrides: of every object's config,
-    with the last word. age [ages]: of objects whose rules give none. seed: that all seeds are derived from.
+    with the last word. age [ages] and variants: of objects whose rules give none. seed: that all seeds are
+    derived from.
     """
 
     config: str | None = None
     overrides: Sequence[str | Override] = ()
     age: float | None = None
     seed: int | None = None
+    variants: int | Literal["each"] | None = None
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,10 @@ class ScenePlan:
             models.setdefault(_asset_key(shown), f"{MODELS}/{shown.variant.name}.obj")
         return {shown.variant.name: models[_asset_key(shown)] for shown in self.variants}
 
-    def why_kept(self, name: str) -> str:
+    def why_kept(self, item: SceneObject) -> str:
         """Why an object stays as it is; empty for one that is weathered."""
-        if name in self.shown:
+        if item.name in self.shown:
             return ""
-        item = next(item for item in self.scene.objects if item.name == name)
         return item.kept or "a rule says so"
 
 
@@ -102,8 +103,9 @@ def plan_scene(scene: Scene, choices: Choices | None = None) -> ScenePlan:
 
     Raises ConfigError for what is wrong with a config, NoFacesError for a mesh on which nothing is painted.
     """
-    configs = _Configs(scene, choices or Choices())
-    rules = {item.name: scene.decision(item.name) for item in scene.objects}
+    choices = choices or Choices()
+    configs = _Configs(scene, choices)
+    rules = {item.name: _decision(scene, item.name, choices) for item in scene.objects}
     wanted = [item for item in scene.objects if not item.kept and rules[item.name].weathered is not False]
     names = [item.name for item in wanted]
     metres = configs.of(Rule("*")).config.scene.metres_per_unit
@@ -125,6 +127,11 @@ def stretched(surface: Surface, variant: Variant) -> Surface:
     shape, up = variant.placement.shape, variant.placement.up
     vertices = surface.vertices if (shape == np.eye(3)).all() else place(surface.vertices, shape)
     return replace(surface, vertices=vertices, up=(float(up[0]), float(up[1]), float(up[2])))
+
+
+def _decision(scene: Scene, name: str, choices: Choices) -> Rule:
+    rule = scene.decision(name)
+    return rule if rule.variants is not None else replace(rule, variants=choices.variants)
 
 
 class _Configs:

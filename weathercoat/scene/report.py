@@ -12,6 +12,7 @@ from typing import Any
 from weathercoat.output.report import versions
 from weathercoat.scene.detail import pixels_per_unit
 from weathercoat.scene.exposure import ground_level
+from weathercoat.scene.graph import SceneObject
 from weathercoat.scene.plan import ScenePlan, VariantPlan
 
 REPORT = "scene.json"
@@ -39,7 +40,7 @@ def make_report(plan: ScenePlan, source: str, batch: Mapping[str, Any] | None = 
             "field_of_view": camera.field_of_view,
             "image_height": camera.image_height,
         },
-        "objects": [_object_row(plan, item.name) for item in scene.objects],
+        "objects": [_object_row(plan, item) for item in scene.objects],
         "variants": [
             _variant_row(variant, plan.assets, results.get(job_name(variant))) for variant in plan.variants
         ],
@@ -52,9 +53,9 @@ def job_name(variant: VariantPlan) -> str:
     return f"objects/{variant.variant.name}"
 
 
-def _object_row(plan: ScenePlan, name: str) -> dict[str, Any]:
-    item = next(item for item in plan.scene.objects if item.name == name)
-    row: dict[str, Any] = {"name": name, "mesh": item.mesh, "kept": plan.why_kept(name) or None}
+def _object_row(plan: ScenePlan, item: SceneObject) -> dict[str, Any]:
+    name = item.name
+    row: dict[str, Any] = {"name": name, "mesh": item.mesh, "kept": plan.why_kept(item) or None}
     if name not in plan.shown:
         return {**row, "variant": None, "weathering": None, "detail": None}
     shown, camera, distance = plan.shown[name], plan.scene.camera, plan.distances.get(name)
@@ -113,6 +114,7 @@ def _detail(shown: VariantPlan) -> dict[str, Any]:
         "steps": config.ageing.steps,
         "solver": config.deformation.solver,
         "errors": None if quality is None else quality["expected"]["errors"],
+        "kept": [] if quality is None else sorted(quality["kept"]),
     }
 
 
@@ -157,7 +159,8 @@ def _error_word(detail: Mapping[str, Any]) -> str:
     """The expected error that people see: of the film in pixels, or of areas where none are known."""
     errors = detail["errors"]
     if not errors:
-        return "unknown"
+        # none is measured for the finest way, which is what the others are measured against
+        return "unknown" if detail["quality"] is None or detail["kept"] else "reference"
     return f"{errors['pixels']:.2f} px" if "pixels" in errors else f"{errors['areas']:.0%}"
 
 
