@@ -42,7 +42,7 @@ def test_what_is_behind_or_beside_is_never_seen() -> None:
 
 
 def test_what_lies_under_the_camera_counts_only_where_it_is_shown() -> None:
-    floor = box("floor", 0, -1.5, 0, scale=(40, 1, 40))
+    floor = box("floor", 0, -1.5, 0, scale=(16, 1, 16))
     found = nearest_distances(yard(floor, camera=looking((0, 0, 0))))
     # the camera stands 1 above the floor; the lower corners of its image meet it further away
     slope = np.tan(np.radians(20.0)) * np.hypot(1.0, 16 / 9)
