@@ -13,6 +13,17 @@ from weathercoat.mesh.surface import Indices, Vectors, face_areas
 from weathercoat.output.report import find_openings
 from weathercoat.sim.snapshot import Snapshot
 
+PATTERN_FIGURES = (
+    "junctions_three",
+    "junctions_four",
+    "straightness",
+    "dead_ends",
+    "crack_spacing",
+    "pieces",
+    "piece_median_area",
+    "piece_roundness",
+    "raised",
+)
 MOST_SPACING = 1.0  # sizes; what a film without cracks has
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from weathercoat.comparison.patterns import measure_pattern
+from weathercoat.comparison.patterns import PATTERN_FIGURES, measure_pattern
 from weathercoat.errors import AccessError, CorruptError
 from weathercoat.output.folder import REPORT, SNAPSHOTS, snapshot_stem
 from weathercoat.output.snapshots import read_snapshot_ply
@@ -28,6 +28,7 @@ _REPORTED = {
     "substrate_rust": (("substrate_rust",), 0),
     "dust": (("dust",), 0),
 }
+FIGURES = (*_REPORTED, *PATTERN_FIGURES)
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def measure_run(folder: Path | str) -> RunFigures:
         raise CorruptError(what, file=str(folder), remedy="run again") from error
     if all(file.exists() for file in files):
         patterns = [measure_pattern(read_snapshot_ply(file)) for file in files]
-        figures |= {name: tuple(pattern[name] for pattern in patterns) for name in patterns[0]}
+        figures |= {name: tuple(pattern[name] for pattern in patterns) for name in PATTERN_FIGURES}
     return RunFigures(folder.name, ages, figures)
 
 

@@ -1,0 +1,82 @@
+"""How far runs that differ in nothing but their seed are apart, as measured by `weathercoat bench noise`.
+
+What was measured follows simple laws: numbers and areas of patches spread by their square root, and means
+over what lies along cracks the less, the longer these are. So one coefficient for each figure serves for
+models and ages that were not measured, roughly.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from weathercoat.mesh.surface import Vectors
+
+
+class Law(NamedTuple):
+    """The spread of a figure of the value v where cracks and outlines are L sizes long: a coefficient times
+    v^value (1 - v)^rest L^-length.
+    """
+
+    value: float
+    rest: float = 0.0
+    length: float = 0.0
+
+
+_SHARE = Law(0.5, rest=0.5)
+_COUNT = Law(0.5)
+_RELATIVE = Law(1.0)
+_MEAN = Law(0.0, length=0.5)
+_RELATIVE_MEAN = Law(1.0, length=0.5)
+
+LAWS: Mapping[str, Law] = {
+    "separated_share": _SHARE,
+    "lost_share": _SHARE,
+    "affected_share": _SHARE,
+    "crack_length": _COUNT,
+    "outline_length": _COUNT,
+    "flakes": _COUNT,
+    "flake_median_area": _RELATIVE_MEAN,
+    "flake_largest_area": _RELATIVE_MEAN,
+    "film_rust": _SHARE,
+    "substrate_rust": _SHARE,
+    "dust": _RELATIVE,
+    "junctions_three": _MEAN,
+    "junctions_four": _MEAN,
+    "straightness": _MEAN,
+    "dead_ends": Law(0.5, length=0.5),
+    "crack_spacing": _RELATIVE,
+    "pieces": _COUNT,
+    "piece_median_area": _RELATIVE,
+    "piece_roundness": _RELATIVE,
+    "raised": _RELATIVE_MEAN,
+}
+_LEAST_LENGTH = 0.1  # sizes: shorter cracks are a few edges
+_FILE = Path(__file__).with_name("noise.json")
+
+
+def unit_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
+    """The spread of a figure with the coefficient 1, of its values at several ages, of the same shape.
+
+    length: of cracks and outlines there, in sizes.
+    """
+    law = LAWS[figure]
+    rest = np.clip(1.0 - values, 0.0, None) ** law.rest
+    return np.abs(values) ** law.value * rest * np.maximum(length, _LEAST_LENGTH) ** -law.length
+
+
+def expected_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
+    """The standard deviation between seeds to be expected of a figure; see `unit_spread`."""
+    return coefficients()[figure] * unit_spread(figure, values, length)
+
+
+@cache
+def coefficients() -> Mapping[str, float]:
+    """The measured coefficient of each figure, below which 9 in 10 cases lie."""
+    content: Mapping[str, float] = json.loads(_FILE.read_bytes())["coefficients"]
+    return content
