@@ -99,7 +99,7 @@ def test_what_is_alike_in_all_runs_of_a_group_has_the_noise_of_others() -> None:
     def with_flakes(run: RunFigures, count: float) -> RunFigures:
         return dataclasses.replace(run, figures={**run.figures, "flakes": (0.0, count)})
 
-    group = [with_flakes(run, 0.0) for run in make_group(1, 6)]
+    group = [with_flakes(run, 0.0) for run in make_group(31, 6)]
     assert judge([with_flakes(make_run(20), 1.0)], group).verdict == "within noise"
     assert judge([with_flakes(make_run(20), 300.0)], group).verdict == "different"
 
