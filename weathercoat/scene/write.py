@@ -102,19 +102,20 @@ class _Writer:
             if thing.node is not None:
                 placed.setdefault(thing.node, []).append(thing)
         replaced = {n for n, things in placed.items() if all(t.name in self.aged for t in things)}
-        entries = source.json.get("nodes", [])
-        shown = [node["mesh"] for n, node in enumerate(entries) if "mesh" in node and n not in replaced]
         with malformed_is_corrupt():
+            entries = source.json.get("nodes", [])
+            shown = [node["mesh"] for n, node in enumerate(entries) if "mesh" in node and n not in replaced]
             document = retain(source, self.buffer, shown)
-        self.meshes = document["meshes"]
-        self.materials = document.pop("materials", [])
-        self.own_materials = _named_once(self.materials)
+            self.meshes = document["meshes"]
+            self.materials = document.pop("materials", [])
+            self.own_materials = _named_once(self.materials)
         for n, things in placed.items():
             if any(t.name in self.aged for t in things):
                 self._dress(document, n, things)
         if not self.meshes:
             del document["meshes"]
-        _drop_instancing(document)
+        with malformed_is_corrupt():
+            _drop_instancing(document)
         return document
 
     def _dress(self, document: dict[str, Any], number: int, things: Sequence[SceneObject]) -> None:

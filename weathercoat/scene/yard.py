@@ -39,10 +39,10 @@ camera:
 rules:
   - match: ground            # concrete
     weathered: off
-  - match: "*barrel*"
-    set: {{appearance.paint: "#2f5f9e"}}
   - match: "shed/*"
     set: {{appearance.paint: "#7d8b86"}}
+  - match: "*barrel*"
+    set: {{appearance.paint: "#2f5f9e"}}
   - match: "shed/store/locker*"
     set: {{appearance.paint: "#5d7f5b"}}
   - match: "fence/*"
