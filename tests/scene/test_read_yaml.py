@@ -12,7 +12,7 @@ import pytest
 import weathercoat
 from tests.scene.documents import Document
 from weathercoat.errors import AccessError, ConfigError
-from weathercoat.mesh.shapes import make_box
+from weathercoat.mesh.shapes import SHAPES, make_box
 from weathercoat.output.meshes import write_mesh
 from weathercoat.scene.graph import Rule, Scene, place
 from weathercoat.scene.read import read_scene
@@ -215,6 +215,18 @@ def test_a_missing_model_is_named(folder: Path) -> None:
     with pytest.raises(AccessError) as caught:
         read(folder, "objects: [{name: a, model: none.obj}]\n")
     assert caught.value.file == str(folder / "none.obj")
+
+
+def test_the_example_of_the_documentation_holds(tmp_path: Path) -> None:
+    page = Path(weathercoat.__file__).parents[1] / "docs" / "scenes.md"
+    example = page.read_text(encoding="utf-8").split("```yaml\n")[1].partition("```")[0]
+    for name in ("sign", "barrel"):
+        write_mesh(tmp_path / f"{name}.obj", SHAPES[name]())
+    scene = read(tmp_path, example)
+    assert [o.name for o in scene.objects] == ["sign", "barrel/0", "barrel/1"]
+    for thing in scene.objects:
+        extent = np.ptp(place(scene.meshes[thing.mesh].vertices, thing.transform), axis=0)
+        assert extent[2] > 0.6  # upright: the sign is 0.7 high, the barrel 0.88
 
 
 def test_the_published_schema_is_that_of_the_model(folder: Path) -> None:

@@ -40,7 +40,7 @@ def command() -> None:
 
 
 @click.command(_YARD)
-@options.output("GLB file; the scene file gets its name with .yaml. Default: yard.glb.")
+@options.output("The .glb or the .yaml file; the other one gets its name. Default: yard.glb.")
 @options.overwrite
 @options.as_json
 @options.debug

@@ -171,19 +171,20 @@ _FIELD_OF_VIEW = 50.0
 
 
 def write_yard_files(path: Path, *, overwrite: bool = False) -> tuple[Path, Path]:
-    """Write the yard to `path`, a .glb, and beside it the scene file with its rules; returns both.
+    """Write the yard as .glb, and beside it the scene file with its rules as .yaml; returns both.
 
-    Raises UsageError for another extension, OutputExistsError, OutputError.
+    path: either of them. Raises UsageError for another extension, OutputExistsError, OutputError.
     """
-    if path.suffix.lower() != ".glb":
+    if path.suffix not in (".glb", ".yaml"):
         raise UsageError(
-            f"a scene is not written as {path.suffix or 'a file without extension'}", remedy="use .glb"
+            f"a scene is not written as {path.suffix or 'a file without extension'}",
+            remedy="use .glb or .yaml",
         )
-    rules = path.with_suffix(".yaml")
-    with whole_file(path, overwrite=overwrite) as stream, whole_file(rules, overwrite=overwrite) as text:
+    nodes, rules = path.with_suffix(".glb"), path.with_suffix(".yaml")
+    with whole_file(nodes, overwrite=overwrite) as stream, whole_file(rules, overwrite=overwrite) as text:
         write_yard(stream)
-        text.write(YARD_YAML.format(glb=json.dumps(path.name)).encode())
-    return path, rules
+        text.write(YARD_YAML.format(glb=json.dumps(nodes.name)).encode())
+    return nodes, rules
 
 
 def write_yard(target: Path | str | BinaryIO) -> None:
