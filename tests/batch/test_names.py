@@ -14,11 +14,11 @@ from weathercoat.batch.names import (
     Named,
     check_names,
     found_name,
-    is_url,
     model_name,
     safe_path,
 )
 from weathercoat.batch.record import RECORD
+from weathercoat.batch.storage import is_url
 from weathercoat.errors import UsageError
 from weathercoat.output.folder import safe_name
 

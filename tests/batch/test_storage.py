@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from tests.batch.jobs import make_job, make_task, result_bytes
+from weathercoat.batch.batch import run_batch
 from weathercoat.batch.job import Outcome, Task
+from weathercoat.batch.processes import InlineExecutor
 from weathercoat.batch.storage import fetch, is_url, join, publish, read_report
 from weathercoat.batch.work import do_task
 from weathercoat.errors import AccessError, OutputError
@@ -227,3 +229,34 @@ def test_what_has_to_be_installed_is_named(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(AccessError) as caught:
         read_report("s3://bucket/out")
     assert "pip install 'weathercoat[urls]'" in caught.value.line()
+
+
+def test_a_batch_goes_to_a_url_and_is_not_done_again(bucket: str, tmp_path: Path) -> None:
+    jobs = [make_job(tmp_path, "a"), make_job(tmp_path, "b/c", "seed=2")]
+    put(Path(jobs[0].asset), f"{bucket}/sheet_100.obj")
+    jobs.append(replace(jobs[0], name="d", asset=f"{bucket}/sheet_100.obj"))
+    run_batch(jobs, tmp_path / "out", InlineExecutor())
+    for statuses in (["done"] * 3, ["unchanged"] * 3):
+        record = run_batch(jobs, f"{bucket}/out", InlineExecutor())
+        assert [row["status"] for row in record["jobs"]] == statuses
+        with fsspec.open(f"{bucket}/out/batch.json") as stream:
+            assert json.load(stream) == record
+    for job in jobs:
+        there = content_at(f"{bucket}/out/{job.name}", tmp_path / "got")
+        assert there == result_bytes(tmp_path / "out" / job.name)
+
+
+@pytest.mark.parametrize("is_away", [False, True])
+def test_a_result_of_another_version_is_replaced(
+    is_away: bool, bucket: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = make_job(tmp_path, "a")
+    task = Task(job, f"{bucket}/a" if is_away else str(tmp_path / "out"), 1e6, 1.0)
+    with monkeypatch.context() as patched:
+        patched.setattr("weathercoat.resume.versions", lambda: {"weathercoat": "0.0.1"})
+        before = done(task)
+        old = read_report(task.target)
+    after = done(task)
+    new = read_report(task.target)
+    assert before.status == after.status == "done" and done(task).status == "unchanged"
+    assert old is not None and new is not None and old["fingerprint"] != new["fingerprint"]

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
 from weathercoat.batch.price import price_job
-from weathercoat.batch.record import Record
+from weathercoat.batch.record import RECORD, Record
+from weathercoat.batch.storage import is_url, join, put_file, read_report
 from weathercoat.errors import AccessError, OutputError
 from weathercoat.lock import FolderLock
-from weathercoat.output.folder import REPORT, output_errors
+from weathercoat.output.folder import output_errors
 from weathercoat.resume import fingerprint, missing_files
 from weathercoat.run import hash_inputs
 
@@ -38,20 +39,18 @@ def run_batch(
     """Run jobs into folders of their names in `out`, and return the content of its `batch.json`.
 
     workers: how many run at once, for the record. threads: of each. check: whether results are verified.
-    max_memory: bytes beyond which a job is refused. fail_fast: the first failure ends the batch, and what has
-    not ended is dropped. begin: called with what is to be done, without what is unchanged. listen: called
-    with each event. A job that fails is in the record, and raises nothing. Raises OutputError where `out`
-    cannot be written, or another batch is at it.
+    max_memory: bytes beyond which a job is refused. fail_fast: the first failure ends the batch, and what
+    has not ended is dropped. begin: called with what is to be done, without what is unchanged. listen:
+    called with each event. A job that fails is in the record, and raises nothing. Raises OutputError where
+    `out` cannot be written, or another batch is at it. Where `out` is a URL, which cannot be locked,
+    `batch.json` is written at the end.
     """
-    folder = Path(out)
     listen = listen or (lambda event: None)
-    with output_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    with _sole_use(folder):
-        unchanged, left = sort_out(jobs, folder)
+    with _folder_of_record(str(out)) as folder:
+        unchanged, left = sort_out(jobs, out)
         prices = {job.name: price_job(job) for job in left}
         tasks = [
-            Task(job, str(folder / job.name), price.memory, price.seconds, threads, check, max_memory)
+            Task(job, join(str(out), job.name), price.memory, price.seconds, threads, check, max_memory)
             for job, price in ((job, prices[job.name]) for job in left)
         ]
         tasks.sort(key=lambda task: -task.seconds)
@@ -89,12 +88,12 @@ def _run(
     return True
 
 
-def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
+def sort_out(jobs: Sequence[Job], out: str | Path) -> tuple[list[Outcome], list[Job]]:
     """Outcomes of the jobs whose results are in `out` and unchanged, and the jobs that are left to do."""
     unchanged, left = [], []
     inputs: dict[str, dict[str, str]] = {}
     for job in jobs:
-        figures = _finished_figures(out / job.name, job, inputs)
+        figures = _finished_figures(join(str(out), job.name), job, inputs)
         if figures is None:
             left.append(job)
         else:
@@ -102,18 +101,44 @@ def sort_out(jobs: Sequence[Job], out: Path) -> tuple[list[Outcome], list[Job]]:
     return unchanged, left
 
 
-def _finished_figures(folder: Path, job: Job, inputs: dict[str, dict[str, str]]) -> dict[str, Any] | None:
-    """The last figures of the finished run in a folder, where it is that of the job; else None."""
+def _finished_figures(target: str, job: Job, inputs: dict[str, dict[str, str]]) -> dict[str, Any] | None:
+    """The last figures of the finished run at a target, where it is that of the job; else None, as for a
+    model at a URL, which only whoever fetches it can tell.
+    """
+    if is_url(job.asset):
+        return None
+    report = read_report(target)
+    if report is None:
+        return None
     try:
-        report = json.loads((folder / REPORT).read_bytes())
         found, snapshots = report["fingerprint"], report["snapshots"]
         if job.asset not in inputs:
             inputs[job.asset] = hash_inputs(Path(job.asset))
         if found != fingerprint(job.loaded, inputs[job.asset]):
             return None
-        return None if missing_files(folder, report) else dict(snapshots[-1])
-    except (OSError, ValueError, KeyError, TypeError, IndexError, AccessError):
+        if not is_url(target) and missing_files(Path(target), report):
+            return None
+        return dict(snapshots[-1])
+    except (ValueError, KeyError, TypeError, IndexError, AccessError):
         return None
+
+
+@contextlib.contextmanager
+def _folder_of_record(out: str) -> Iterator[Path]:
+    """The folder of a batch, for nobody else; for a URL one whose record goes there at the end."""
+    if is_url(out):
+        with TemporaryDirectory(prefix="weathercoat-") as aside:
+            try:
+                yield Path(aside)
+            finally:
+                if Path(aside, RECORD).is_file():
+                    put_file(Path(aside, RECORD), join(out, RECORD))
+        return
+    folder = Path(out)
+    with output_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with _sole_use(folder):
+        yield folder
 
 
 @contextlib.contextmanager

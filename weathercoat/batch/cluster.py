@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from uuid import uuid4
 
 from weathercoat.batch.job import Outcome, Progress, Task
+from weathercoat.batch.storage import is_url
 from weathercoat.batch.work import do_task
 from weathercoat.cost import in_megabytes
 from weathercoat.errors import (
@@ -72,7 +74,8 @@ class DaskExecutor:
         if not tasks:
             return
         with _connected(self._scheduler) as client:
-            yield from _Dispatch(client, self._scheduler, tasks, self._seconds_without_workers).events()
+            here = [_from_anywhere(task) for task in tasks]
+            yield from _Dispatch(client, self._scheduler, here, self._seconds_without_workers).events()
 
 
 @dataclass
@@ -284,6 +287,8 @@ class _Dispatch:
         if outcome is None or outcome.status == "dropped":
             yield from self._lose(attempt)
         else:
+            if attempt.number > 1 and outcome.status == "unchanged":  # by an attempt that was taken for lost
+                outcome = replace(outcome, status="done")
             yield self._with_remarks(replace(outcome, attempts=attempt.number))
 
     def _ended_otherwise(self, attempt: _Attempt, error: BaseException) -> Outcome | None:
@@ -366,6 +371,13 @@ def _read_address(scheduler: str) -> str:
         return str(json.loads(path.read_bytes())["address"])
     except (OSError, ValueError, KeyError, TypeError):
         raise UsageError("is no file that a scheduler has written", file=scheduler) from None
+
+
+def _from_anywhere(task: Task) -> Task:
+    """The task with whole paths: workers have working directories of their own."""
+    job = task.job
+    asset, target = (text if is_url(text) else os.path.abspath(text) for text in (job.asset, task.target))  # noqa: PTH100 (which follows no links)
+    return replace(task, job=replace(job, asset=asset), target=target)
 
 
 def _new_key(kind: str) -> str:

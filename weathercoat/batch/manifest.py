@@ -16,7 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from weathercoat.batch.names import is_url, model_name, safe_path
+from weathercoat.batch.names import model_name, safe_path
+from weathercoat.batch.storage import is_url
 from weathercoat.config.document import Item, decode, read_items, read_value, without_lines
 from weathercoat.config.load import Override
 from weathercoat.config.presets import preset_names

@@ -12,13 +12,13 @@ from pathlib import Path, PurePath, PurePosixPath
 from typing import NamedTuple
 
 from weathercoat.batch.record import RECORD
+from weathercoat.batch.storage import is_url
 from weathercoat.errors import OutputExistsError, UsageError
 from weathercoat.output.folder import REPORT, safe_name
 
 STYLES = ("stem", "path")
 PARTIAL = ".partial"  # ends the names of folders that are being written
 
-_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")
 _END_OF_PATH = re.compile(r"::|[?#]")  # in a URL: chained file systems, a query, a fragment
 
 
@@ -28,11 +28,6 @@ class Named(NamedTuple):
     name: str
     asset: str
     place: str
-
-
-def is_url(text: str) -> bool:
-    """Whether a model is named by a URL, such as `s3://bucket/chair.glb`, rather than by a path."""
-    return _URL.match(text) is not None
 
 
 def model_name(model: str, style: str = "stem") -> str:

@@ -19,10 +19,10 @@ from weathercoat.batch.names import (
     check_names,
     check_room,
     found_name,
-    is_url,
     model_name,
 )
 from weathercoat.batch.record import RECORD
+from weathercoat.batch.storage import is_url
 from weathercoat.batch.study import check_count, parse_study
 from weathercoat.config.load import Override
 from weathercoat.errors import ConfigProblem, UsageError

@@ -77,6 +77,14 @@ def publish(folder: Path, url: str) -> None:
             files.rm_file(f"{place}/{name}")
 
 
+def put_file(path: Path, url: str) -> None:
+    """Write a file to a URL; raises OutputError where that cannot be."""
+    with _errors(OutputError, url):
+        files, place = _open(url)
+        files.makedirs(posixpath.dirname(place), exist_ok=True)
+        files.put_file(str(path), place)
+
+
 def read_report(target: str) -> dict[str, Any] | None:
     """The `run.json` of a folder given by path or URL; None where there is none, or none that is whole.
 

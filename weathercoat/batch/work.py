@@ -9,13 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from weathercoat.batch.job import Job, Outcome, Task
+from weathercoat.batch.job import Job, Outcome, Status, Task
 from weathercoat.batch.storage import fetch, is_url, publish, read_report
 from weathercoat.errors import CorruptError, ResumeError, WeathercoatError, internal_error
-from weathercoat.mesh.read import name_of
-from weathercoat.output.report import sha256
 from weathercoat.resume import fingerprint
-from weathercoat.run import run_asset
+from weathercoat.run import hash_inputs, run_asset
 from weathercoat.sim.recorders import Patience
 
 
@@ -51,17 +49,22 @@ def do_task(
 
         out.parent.mkdir(parents=True, exist_ok=True)
         try:
-            return attempt(resume=True)
+            report = attempt(resume=True)
         except (ResumeError, CorruptError) as found:
             if not _is_within(found.file, str(out)):
                 raise
             return attempt(resume=False)
+        if _is_found(report) and not _is_current(report, task.job, model):  # another version made it
+            return attempt(resume=False)
+        return report
 
     try:
         with _model_here(task.job) as model:
             report = _run_for_url(task, model, run) if is_url(task.target) else run(model, Path(task.target))
         figures = report["snapshots"][-1] if report["snapshots"] else None
-        return Outcome(task.job.name, "done", time.perf_counter() - started, figures, None, tuple(messages))
+        seconds = time.perf_counter() - started
+        status: Status = "unchanged" if _is_found(report) else "done"
+        return Outcome(task.job.name, status, seconds, figures, None, tuple(messages))
     except Exception as raised:
         error = raised if isinstance(raised, WeathercoatError) else internal_error(raised)
         seconds = time.perf_counter() - started
@@ -86,8 +89,8 @@ def _model_here(job: Job) -> Iterator[str]:
 
 def _run_for_url(task: Task, model: str, run: Callable[[str, Path], dict[str, Any]]) -> dict[str, Any]:
     """The report of the finished run at a task's URL, which is there already or is made."""
-    found = _finished(task, model)
-    if found is not None:
+    found = read_report(task.target)
+    if found is not None and _is_current(found, task.job, model):
         return found
     with TemporaryDirectory(prefix="weathercoat-") as folder:
         out = Path(folder, "run")
@@ -96,19 +99,21 @@ def _run_for_url(task: Task, model: str, run: Callable[[str, Path], dict[str, An
         except BaseException as error:
             error.__notes__ = []  # of what is kept in the temporary folder, which goes
             raise
+        published = read_report(task.target)
         # who was taken for lost may have published it meanwhile
-        if _finished(task, model) is None:
+        if published is None or published.get("fingerprint") != report["fingerprint"]:
             publish(out, task.target)
         return report
 
 
-def _finished(task: Task, model: str) -> dict[str, Any] | None:
-    """The report at a task's URL, where it is that of its job and of this version; else None."""
-    report = read_report(task.target)
-    if report is None or not report.get("snapshots"):
-        return None
-    inputs = {name_of(Path(model)): sha256(Path(model))}
-    return report if report.get("fingerprint") == fingerprint(task.job.loaded, inputs) else None
+def _is_found(report: dict[str, Any]) -> bool:
+    """Whether a report was there already: what is made has a timing."""
+    return "timing" not in report
+
+
+def _is_current(report: dict[str, Any], job: Job, model: str) -> bool:
+    """Whether a report is that of a job with a model at a path, by this version."""
+    return bool(report.get("fingerprint") == fingerprint(job.loaded, hash_inputs(Path(model))))
 
 
 def _is_within(file: str | None, target: str) -> bool:

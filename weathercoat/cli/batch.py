@@ -273,7 +273,7 @@ def _say_price(
     from weathercoat.batch.price import price_job, seconds_together, total_price
     from weathercoat.cost import in_megabytes
 
-    unchanged, left = sort_out(jobs, Path(output))
+    unchanged, left = sort_out(jobs, output)
     prices = {job.name: price_job(job) for job in left}
     total = total_price(prices)
     seconds = seconds_together(list(prices.values()), workers)

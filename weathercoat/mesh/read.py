@@ -6,12 +6,10 @@ model's folder is read, and nothing from the network.
 
 from __future__ import annotations
 
-import json
 import os
 import stat
 from pathlib import Path
 from typing import BinaryIO
-from urllib.parse import unquote
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from weathercoat.errors import (
     UsageError,
     WeathercoatError,
 )
+from weathercoat.mesh.beside import files_beside
 from weathercoat.mesh.formats import sniff
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.repair import repair
@@ -77,12 +76,11 @@ def side_files(path: Path) -> list[Path]:
     if path.suffix.lower() != ".gltf":
         return []
     try:
-        buffers = json.loads(path.read_bytes())["buffers"]
-        names = {str(buffer["uri"]) for buffer in buffers if "uri" in buffer}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        names = files_beside(path.read_bytes(), path.name).read
+    except OSError:
         return []
     folder = path.parent.resolve()
-    beside = {(folder / unquote(name)).resolve() for name in names if not name.startswith("data:")}
+    beside = {(folder / name).resolve() for name in names}
     return sorted(file for file in beside if file.is_relative_to(folder) and file.is_file())
 
 
