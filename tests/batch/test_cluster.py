@@ -22,7 +22,7 @@ from weathercoat.batch.processes import InlineExecutor
 from weathercoat.errors import ClusterError, UsageError
 from weathercoat.output.folder import CHECKPOINT_STATE, RunFolder
 
-pytest.importorskip("distributed")
+Client = pytest.importorskip("distributed").Client
 
 from weathercoat.batch.cluster import DaskExecutor
 
@@ -62,6 +62,10 @@ class Cluster:
             process = subprocess.Popen(command, stdout=log, stderr=log)
         self.processes.append(process)
         return process
+
+    def wait_for_workers(self, count: int) -> None:
+        with Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=60)
 
     def end(self) -> None:
         for process in self.processes:
@@ -236,6 +240,7 @@ def test_a_worker_of_another_version_is_not_used(cluster: Cluster, tmp_path: Pat
         outcomes_of([task], cluster)
     assert caught.value.exit_code == 8
     cluster.start_worker()
+    cluster.wait_for_workers(2)
     assert outcomes_of([task], cluster)["a"].status == "done"
 
 
