@@ -288,6 +288,16 @@ def test_samples_stand_upright_in_every_format(suffix: str, capsys: pytest.Captu
     assert extent[upwards] == pytest.approx(3)
 
 
+def test_sample_writes_a_scene_and_its_rules(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["sample", "--help"]) == 0
+    assert "yard" in capsys.readouterr().out
+    assert call(["sample", "yard", "-o", "y.yaml", "--json"]) == 0
+    written = [json.loads(line)["written"] for line in capsys.readouterr().out.splitlines()]
+    assert written == ["y.glb", "y.yaml"]
+    assert 'scene: "y.glb"' in Path("y.yaml").read_text()
+    assert call(["sample", "yard", "-o", "y.glb"]) == 7
+
+
 def test_inspect_in_words_names_repairs_and_cost(capsys: pytest.CaptureFixture[str]) -> None:
     Path("t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 2\n")
     assert call(["inspect", "t.obj", "--self-intersections"]) == 0

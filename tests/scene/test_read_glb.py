@@ -83,12 +83,14 @@ def test_what_cannot_be_weathered_says_why(tmp_path: Path) -> None:
     document.node(name="flat", mesh=mesh, scale=[1, 0, 1])
     document.node(name="wire", mesh=lines)
     document.node(name="plain", mesh=mesh)
+    document.node(name="sheet", mesh=mesh, scale=[2, 1, 0.001])
     scene = read_scene(document.write(tmp_path / "a.glb", skins=[{"joints": [0]}]))
     assert {o.name: o.kept for o in scene.objects} == {
         "skinned": "it is skinned",
         "morphed": "it has morph targets",
         "flat": "its transform flattens it",
         "plain": "",
+        "sheet": "",
     }
     assert [(note.code, note.count) for note in scene.notes] == [("W-OBJECT", 3), ("W-OBJECT", 1)]
 

@@ -16,7 +16,7 @@ import trimesh
 from tests.output.snapshots import make_snapshot
 from tests.scene.documents import CUBE, Document
 from tests.scene.test_graph import make_transform
-from weathercoat.errors import OutputExistsError
+from weathercoat.errors import CorruptError, OutputExistsError
 from weathercoat.mesh.shapes import make_sphere
 from weathercoat.mesh.surface import make_surface
 from weathercoat.output.meshes import write_mesh
@@ -226,6 +226,24 @@ def test_animations_and_skins_keep_their_accessors(tmp_path: Path) -> None:
     assert np.array_equal(array(out, body, kept["output"]), moves)
     assert out["skins"][0]["inverseBindMatrices"] == 2
     assert [mesh["name"] for mesh in out["meshes"]] == ["skinned", "v"]
+
+
+def test_views_that_begin_between_words_are_read_the_same(tmp_path: Path) -> None:
+    document = Document()
+    document.node(name="a", mesh=document.mesh())
+    positions, indices = document.json["bufferViews"]
+    document.body = bytes(2) + document.body
+    positions["byteOffset"], indices["byteOffset"] = 0, indices["byteOffset"] + 2
+    positions["byteLength"] += 2
+    document.json["accessors"][0]["byteOffset"] = 2
+    with pytest.raises(CorruptError, match="multiple"):  # floats at byte 2
+        read_scene(document.write(tmp_path / "in.glb"))
+    document.body = bytes(2) + document.body
+    positions["byteOffset"], indices["byteOffset"] = 2, indices["byteOffset"] + 2
+    scene = read_scene(document.write(tmp_path / "in.glb"))
+    write(scene, tmp_path, {}, {})
+    again = read_scene(tmp_path / "out.glb")
+    assert np.array_equal(again.meshes["mesh_0"].vertices, scene.meshes["mesh_0"].vertices)
 
 
 def test_accessors_stay_where_an_unknown_extension_may_mean_them(tmp_path: Path) -> None:

@@ -36,8 +36,9 @@ from weathercoat.scene.cameras import animated_nodes, read_cameras
 from weathercoat.scene.graph import Scene, SceneObject, unique_names
 from weathercoat.scene.retained import INSTANCING
 
-# Shortest over longest axis of a transform below which what it places has no body.
-FLATTEST = 1e-6
+# Shortest over longest axis of a transform below which what it places has no body: well above the rounding of
+# stretches, and below the thinnest sheet that is made of a block.
+FLATTEST = 1e-4
 
 
 def parse_glb(data: bytes, path: Path, *, max_faces: int) -> Scene:

@@ -102,9 +102,14 @@ def _copy_views(source: GltfDocument, document: dict[str, Any], buffer: GlbBuffe
     for i in sorted({box["bufferView"] for box in places}):
         check_index(i, views, "bufferView")
         view = views[i]
-        start, end = view.get("byteOffset", 0), view.get("byteOffset", 0) + view["byteLength"]
+        begin, length = view.get("byteOffset", 0), view["byteLength"]
+        # accessors within may rely on where the view lay among four bytes
+        lead = begin % 4
         more = {key: view[key] for key in ("byteStride", "target", "name", "extras") if key in view}
-        number[i] = buffer.add_bytes(source.buffer(view["buffer"])[start:end], **more)
+        content = source.buffer(view["buffer"])[begin - lead : begin + length]
+        number[i] = buffer.add_bytes(content, **more)
+        buffer.views[-1]["byteOffset"] += lead
+        buffer.views[-1]["byteLength"] -= lead
     for box in places:
         box["bufferView"] = number[box["bufferView"]]
 
