@@ -1,20 +1,24 @@
-"""Measure how far runs on other processors drift apart: `python -m tests.measure_machines [--seeds 8]`.
+"""Measure how far runs on other processors drift apart: `python -m tests.measure_machines [--seeds 8]`; and,
+with `--portable`, whether those that are pinned to x86-64-v3 are the same bytes there.
 
 Other machines are emulated on this one, each in a process of its own: kernels compiled for the oldest
 processor of 64 bits (without AVX and FMA), the C library's mathematical functions without FMA, NumPy without
 AVX2, BLAS for an older core, and all of it at once. Every run is whole: the model is remeshed and aged there.
 Compared are, at several ages, what has broken and fallen (the same edges and faces or not), positions of the
 film's corners [sizes], and counts; the spread of these between seeds stands beside. Compiling for the oldest
-processor takes minutes, once: `--cache` keeps the result.
+processor takes minutes, once: `--cache` keeps the result. Portable runs are compared bit for bit, on this
+processor and on those that an emulator, `qemu-x86_64`, makes of it, which takes twenty times as long.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +28,7 @@ from weathercoat.config.load import load_config
 from weathercoat.mesh.shapes import make_sign, make_sphere
 from weathercoat.run import prepare_simulation, remesh_painted
 from weathercoat.sim.simulation import Simulation
+from weathercoat.target import ENVIRONMENT
 
 _AGES = (0.1, 0.25, 0.5, 0.75, 1.0)
 _FACES = 3000
@@ -46,6 +51,8 @@ MACHINES = {
     "BLAS for Nehalem": _OLD_BLAS,
     "all of it": {**_OLD_KERNELS, **_OLD_C, **_OLD_NUMPY, **_OLD_BLAS},
 }
+_WITHOUT_AVX512 = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512CD,-AVX512BW,-AVX512DQ,-AVX512VL"}
+EMULATED = ("Haswell", "Broadwell", "EPYC", "max")
 
 
 class State(NamedTuple):
@@ -93,11 +100,13 @@ def age_here(out: Path, seeds: int) -> None:
     np.savez(out, **states)
 
 
-def age_on(machine: dict[str, str], folder: Path, seeds: int) -> dict[str, np.ndarray]:
+def age_on(
+    machine: dict[str, str], folder: Path, seeds: int, emulator: Sequence[str] = ()
+) -> dict[str, np.ndarray]:
     """The states of all cases and seeds on another machine."""
     out = folder / "states.npz"
     command = [sys.executable, "-m", "tests.measure_machines", "--seeds", str(seeds), "--into", str(out)]
-    subprocess.run(command, env={**os.environ, **machine}, check=True)
+    subprocess.run([*emulator, *command], env={**os.environ, **machine}, check=True)
     with np.load(out) as stored:
         return dict(stored)
 
@@ -128,10 +137,24 @@ def print_comparison(here: dict[str, np.ndarray], there: dict[str, np.ndarray], 
             print(f"  {case:15} age {age:<5} same {same}/{seeds}  positions {apart:7.1e}  {cells}")
 
 
+def print_portable(folder: Path, seeds: int) -> None:
+    """One line for each machine: how many of the arrays of all states are the same, bit for bit."""
+    machines: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {"C library": (_WITHOUT_AVX512, ())}
+    emulator = shutil.which("qemu-x86_64")
+    if emulator:
+        machines |= {model: ({}, (emulator, "-cpu", model)) for model in EMULATED}
+    here = age_on(dict(ENVIRONMENT), folder, seeds)
+    for name, (machine, command) in machines.items():
+        there = age_on({**machine, **ENVIRONMENT}, folder, seeds, command)
+        same = sum(here[key].tobytes() == there[key].tobytes() for key in here)
+        print(f"{name:10} {same} of {len(here)} arrays the same", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--cache", type=Path, help="where kernels of other processors are kept")
+    parser.add_argument("--portable", action="store_true", help="compare runs that are pinned to x86-64-v3")
     parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.into:
@@ -139,6 +162,9 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
+        if given.portable:
+            print_portable(folder, given.seeds)
+            return
         cache = {"NUMBA_CACHE_DIR": str(given.cache or folder / "kernels")}
         here = age_on({}, folder, given.seeds)
         for name, machine in MACHINES.items():

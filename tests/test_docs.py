@@ -63,8 +63,10 @@ def calls(command: str) -> Iterator[list[str]]:
 
 
 def is_plain(command: str) -> bool:
-    """Whether a command is a single call of weathercoat, which needs no shell."""
-    return command.startswith("weathercoat ") and not re.search(r"[|;<>$~]", command)
+    """Whether a command is a single call of weathercoat, which needs neither a shell nor a process of its own,
+    in which libraries are yet to be loaded.
+    """
+    return command.startswith("weathercoat ") and not re.search(r"[|;<>$~]| --portable", command)
 
 
 def quick(arguments: list[str]) -> list[str]:

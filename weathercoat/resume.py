@@ -29,13 +29,18 @@ from weathercoat.output.folder import (
     snapshot_stem,
 )
 from weathercoat.output.report import sha256, versions
+from weathercoat.target import target
 
 _FREE = ("ageing.steps", "ageing.duration", "snapshots.", "checkpoint.")  # keys that may differ
 
 
 def identify(config: Config, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """What tells a run from others, as checkpoints keep it: config, and SHA-256 of inputs by file name."""
-    return {"config": config.as_dict(), "inputs": dict(inputs)}
+    """What tells a run from others, as checkpoints keep it: config, SHA-256 of inputs by file name, and the
+    target, where one is pinned.
+    """
+    pinned = target()
+    about = {"target": pinned} if pinned else {}
+    return {"config": config.as_dict(), "inputs": dict(inputs), **about}
 
 
 def fingerprint(loaded: LoadedConfig, inputs: Mapping[str, str]) -> str:
@@ -117,7 +122,8 @@ def recorded_figures(checkpoint: Checkpoint, config: Config) -> list[dict[str, A
 def _identity_of(report: Mapping[str, Any]) -> dict[str, Any]:
     """The identity of the run of a `run.json`."""
     inputs = {name: entry["sha256"] for name, entry in report.get("inputs", {}).items()}
-    return {"config": report.get("config", {}), "inputs": inputs}
+    pinned = report.get("versions", {}).get("target")
+    return {"config": report.get("config", {}), "inputs": inputs, **({"target": pinned} if pinned else {})}
 
 
 def _read_report(folder: Path) -> dict[str, Any] | None:
@@ -165,6 +171,9 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tup
             before, now = ((side["inputs"].get(name) or "missing")[:12] for side in (old, new))
             if before != now:
                 yield f"input {name}", before, now
+    before, now = (side.get("target", "the processor at hand") for side in (old, new))
+    if before != now:
+        yield "the target", before, now
 
 
 def _flat(config: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

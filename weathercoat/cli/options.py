@@ -96,6 +96,11 @@ max_memory = click.option(
     metavar="SIZE",
     help="Memory that a run may take at its peak, such as 4G; what this process may use, by default.",
 )
+portable = click.option(
+    "--portable",
+    is_flag=True,
+    help="Make results that are the same bytes on every x86-64-v3 processor (with AVX2 and FMA).",
+)
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
 resume = click.option(

@@ -17,6 +17,7 @@ from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
 from weathercoat.errors import UsageError
+from weathercoat.target import pin
 
 
 @click.command()
@@ -30,6 +31,7 @@ from weathercoat.errors import UsageError
 @options.faces
 @options.model_format
 @options.threads
+@options.portable
 @options.max_memory
 @options.overwrite
 @options.resume
@@ -50,6 +52,7 @@ def command(
     faces: int | None,
     model_format: str | None,
     threads: int | None,
+    portable: bool,
     max_memory: int | None,
     overwrite: bool,
     resume: bool,
@@ -65,6 +68,8 @@ def command(
     or - for standard input. The folder of the results appears only once it is whole; a run that was
     interrupted leaves what it has in FOLDER.partial, from where --resume goes on.
     """
+    if portable:
+        pin()
     from weathercoat.config.load import load_config
     from weathercoat.output.folder import safe_name
 

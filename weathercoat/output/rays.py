@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.target import target
 
 Floats = NDArray[np.float32]
 
@@ -46,10 +48,13 @@ class EmbreeRays:
 
 
 def make_rays(vertices: Vectors, faces: Indices) -> RayQueries:
-    """Ray queries on a mesh of vertices (n, 3) and faces (m, 3), m > 0, with the best means at hand."""
-    try:
-        return EmbreeRays(vertices, faces)
-    except ImportError:
-        from weathercoat.output.tree import TreeRays
+    """Ray queries on a mesh of vertices (n, 3) and faces (m, 3), m > 0, with the best means at hand.
 
-        return TreeRays(vertices, faces)
+    Embree meets other faces at edges on other processors, so it has no part in results that are for all.
+    """
+    if target() is None:
+        with suppress(ImportError):
+            return EmbreeRays(vertices, faces)
+    from weathercoat.output.tree import TreeRays
+
+    return TreeRays(vertices, faces)

@@ -25,6 +25,7 @@ from weathercoat.lock import LOCK
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
 from weathercoat.output.folder import REPORT, TIMING
 from weathercoat.sim.snapshot import Snapshot
+from weathercoat.target import target
 
 REPORT_VERSION = 1
 LIBRARIES = ("numpy", "scipy", "numba", "qdldl")
@@ -236,9 +237,13 @@ def make_timing(simulation: Mapping[str, float], around: Mapping[str, float]) ->
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of Python, of the libraries that figures depend on, and of weathercoat."""
+    """Versions of Python, of the libraries that figures depend on, and of weathercoat; and the target, where
+    one is pinned.
+    """
     found = {name: metadata.version(name) for name in LIBRARIES}
-    return {"python": platform.python_version(), "weathercoat": __version__, **found}
+    pinned = target()
+    about = {"target": pinned} if pinned else {}
+    return {"python": platform.python_version(), "weathercoat": __version__, **found, **about}
 
 
 def sha256(content: bytes | Path) -> str:
