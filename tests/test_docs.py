@@ -63,8 +63,8 @@ def calls(command: str) -> Iterator[list[str]]:
 
 
 def is_plain(command: str) -> bool:
-    """Whether a command is a single call of weathercoat, which needs neither a shell nor a process of its own,
-    in which libraries are yet to be loaded.
+    """Whether a command is a single call of weathercoat that needs neither a shell nor a process of its
+    own, whose libraries are not yet loaded.
     """
     return command.startswith("weathercoat ") and not re.search(r"[|;<>$~]| --portable", command)
 

@@ -63,6 +63,7 @@ _MOST_NAMES = 5  # of the message about what failed
     "--dry-run", is_flag=True, help="Say what would be run and what it would cost, and run nothing."
 )
 @click.option("--fail-fast", is_flag=True, help="End the batch at the first job that fails.")
+@options.portable
 @options.max_memory
 @options.no_check
 @options.quiet

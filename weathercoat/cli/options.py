@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from weathercoat.config.presets import preset_names
 from weathercoat.config.quality import AUTO, LEVELS
 from weathercoat.errors import UsageError
 from weathercoat.memory import parse_size
+from weathercoat.target import pin
 
 if TYPE_CHECKING:
     from weathercoat.config.load import Override
@@ -96,11 +98,6 @@ max_memory = click.option(
     metavar="SIZE",
     help="Memory that a run may take at its peak, such as 4G; what this process may use, by default.",
 )
-portable = click.option(
-    "--portable",
-    is_flag=True,
-    help="Make results that are the same bytes on every x86-64-v3 processor (with AVX2 and FMA).",
-)
 quiet = click.option("-q", "--quiet", is_flag=True, help="Print errors only, and what --json asks for.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print results, and an error, as JSON.")
 resume = click.option(
@@ -129,6 +126,23 @@ def threads_beside(workers: int) -> int:
     from weathercoat.deform.team import usable_cores
 
     return max(1, min(MOST_THREADS, usable_cores() // workers))
+
+
+def portable(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The option --portable, which pins the process before the command begins."""
+
+    @click.option(
+        "--portable",
+        is_flag=True,
+        help="Make results that are the same bytes on every x86-64-v3 processor (with AVX2 and FMA).",
+    )
+    @wraps(command)
+    def pinned(*, portable: bool, **arguments: Any) -> Any:
+        if portable:
+            pin()
+        return command(**arguments)
+
+    return pinned
 
 
 def shortcuts(**values: object) -> Iterator[Override]:

@@ -17,7 +17,6 @@ from weathercoat.cli import options
 from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
 from weathercoat.errors import UsageError
-from weathercoat.target import pin
 
 
 @click.command()
@@ -52,7 +51,6 @@ def command(
     faces: int | None,
     model_format: str | None,
     threads: int | None,
-    portable: bool,
     max_memory: int | None,
     overwrite: bool,
     resume: bool,
@@ -68,8 +66,6 @@ def command(
     or - for standard input. The folder of the results appears only once it is whole; a run that was
     interrupted leaves what it has in FOLDER.partial, from where --resume goes on.
     """
-    if portable:
-        pin()
     from weathercoat.config.load import load_config
     from weathercoat.output.folder import safe_name
 

@@ -57,6 +57,7 @@ class _Variants(click.ParamType):
 @click.option(
     "--no-preview", "preview", is_flag=True, flag_value=False, default=True, help="Draw no picture."
 )
+@options.portable
 @options.max_memory
 @options.no_check
 @options.quiet

@@ -12,7 +12,6 @@ from typing import Literal, get_args, get_origin
 import click
 
 from weathercoat.cli import options
-from weathercoat.target import pin
 
 _CONCAVE_POLYGON = b"v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n"
 
@@ -22,15 +21,13 @@ _CONCAVE_POLYGON = b"v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2
 @options.quiet
 @options.as_json
 @options.debug
-def command(portable: bool, quiet: bool, as_json: bool) -> None:
+def command(quiet: bool, as_json: bool) -> None:
     """Compile ahead what the other commands need.
 
     They compile their kernels when they first need them and keep them in the user's cache directory, or below
     NUMBA_CACHE_DIR. This does so at once, by ageing a small part in each way; it does nothing where all is
     kept already.
     """
-    if portable:
-        pin()
     from weathercoat.cli.messages import Messages
     from weathercoat.compile import cache_folder, remove_unused, watch_compiling
 
