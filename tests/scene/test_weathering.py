@@ -13,6 +13,7 @@ from weathercoat.scene.exposure import Exposure, measure_exposure
 from weathercoat.scene.graph import SceneObject
 from weathercoat.scene.weathering import (
     INDOORS,
+    LEAST_STEPS,
     SPLASH_HEIGHT,
     Weathering,
     free_standing,
@@ -118,11 +119,12 @@ def test_rust_follows_wet_time_and_dust_real_time() -> None:
 def test_explicit_snapshots_keep_their_share_of_the_run() -> None:
     loaded = load_config("rusting", ["ageing.steps=100", "snapshots.steps=[0, 50, 100]"])
     aged = weathered_config(loaded, weather(evenly(0, 0), 1.0, 0.1), age=1.0, up=(0, 1, 0), seed=1).config
-    assert aged.snapshots.steps == (0, 5, 10)
+    assert aged.snapshots.steps == (0, 10, 20)
     assert not aged.conflicts()
 
 
-def test_what_hardly_weathers_still_makes_a_step() -> None:
-    loaded = load_config("rusting", ["ageing.steps=10"])
+def test_what_hardly_weathers_takes_short_steps() -> None:
+    loaded = load_config("rusting", ["ageing.steps=100"])
     aged = weathered_config(loaded, weather(evenly(0, 0), 1.0, 0.0), age=0.01, up=(0, 1, 0), seed=1).config
-    assert aged.ageing.steps == 1
+    assert aged.ageing.steps == LEAST_STEPS
+    assert aged.ageing.duration == pytest.approx(0.01)

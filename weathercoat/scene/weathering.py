@@ -33,9 +33,11 @@ WEAR_BY_LIGHT, WEAR_BY_RAIN, WEAR_BY_WET = 0.35, 0.30, 0.35
 STEEPNESS = 2.5
 INDOORS = 0.05  # degree of what nothing reaches
 WASHED = 0.6  # share of the dust that rain keeps off what is exposed like a free-standing thing
+LEAST_STEPS = 20  # of a run: a shorter one takes shorter steps
 LEAST_FACTOR, MOST_FACTOR = 0.1, 3.0
 MOST_DUST = 25.0  # as a factor on dust.rate, where a run is short because nothing but dust reaches the object
 _DIGITS = 3
+_SHORTEST = 1e-9  # ages that a config takes
 
 _Values = Mapping[str, Any]
 
@@ -119,18 +121,20 @@ def weathered_config(
 ) -> LoadedConfig:
     """The config of an object that has been exposed for `age`: run for age times degree, with its own rates.
 
-    The steps keep the length that they have in `loaded`, and snapshots their share of the run. up: unit
-    vector against gravity in the object's axes. The factors apply to what the config says, whoever said it.
+    The steps keep the length that they have in `loaded`, but for a run of fewer than `LEAST_STEPS`, and
+    snapshots their share of the run. up: unit vector against gravity in the object's axes. The factors apply
+    to what the config says, whoever said it.
     """
     config = loaded.config
     tick = config.ageing.duration / config.ageing.steps
-    steps = max(1, round(age * weathering.degree / tick))
+    duration = max(1, round(age * weathering.degree / tick)) * tick
+    steps = max(round(duration / tick), min(LEAST_STEPS, config.ageing.steps))
     rust, dust = config.rust, config.dust
     values = {
         "seed": seed,
         "model.up": list(up),
         "ageing.steps": steps,
-        "ageing.duration": max(steps * tick, 1e-9),
+        "ageing.duration": max(duration, _SHORTEST),
         "dust.rate": dust.rate * weathering.dust,
         "rust.source_rate": rust.source_rate * weathering.rust,
         "rust.lifted_rate": rust.lifted_rate * weathering.rust,
