@@ -7,6 +7,7 @@
     python docs/make.py comparison          the default beside the paper's literal rules
     python docs/make.py gallery             every shipped config on five parts, images/gallery
     python docs/make.py first               the picture of the README
+    python docs/make.py yard                the picture of exposure.md
     python docs/make.py speed --results FOLDER
                                             performance.md with what `weathercoat bench speed -o FOLDER` wrote
     python docs/make.py accuracy --results FOLDER
@@ -33,11 +34,12 @@ from making import (
     gallery,
     independence,
     pages,
+    scenes,
     speed,
     stability,
 )
 
-PARTS = ("pages", "effects", "comparison", "gallery", "first")
+PARTS = ("pages", "effects", "comparison", "gallery", "first", "yard")
 RESULTS = {
     "speed": speed.take_results,
     "accuracy": accuracy.take_results,
@@ -75,6 +77,8 @@ def main() -> None:
         gallery.draw_gallery(wanted.config)
     if "first" in parts:
         gallery.draw_first()
+    if "yard" in parts:
+        scenes.draw_yard()
     for part in parts:
         if part in RESULTS:
             RESULTS[part](wanted.results)

@@ -32,6 +32,7 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE_SPAN = re.compile(r"`[^`\n]+`")
 # What a run is given on top, so that it takes a moment; its snapshots keep their numbers, thinned out.
 QUICK = ("--faces", "300", "--set", "output.picture_width=24", "--set", "output.picture_height=16")
+QUICK_SCENE = ("--set", "remesh.faces=300", "--set", "ageing.steps=50", "--no-preview")
 SHELL_ONLY = ("make", "pip", "pipx", "mkdir")
 LARGEST_IMAGES = 12_000_000
 
@@ -71,7 +72,8 @@ def is_plain(command: str) -> bool:
 
 def quick(arguments: list[str]) -> list[str]:
     """The same call on a coarse mesh, with small pictures."""
-    return [*arguments, *QUICK] if arguments[0] == "run" else arguments
+    extra = {"run": QUICK, "scene": QUICK_SCENE}
+    return [*arguments, *extra.get(arguments[0], ())]
 
 
 @pytest.fixture(scope="module")

@@ -144,8 +144,8 @@ def table_lines(report: Mapping[str, Any]) -> Iterator[str]:
     seconds = sum(variant["expected"]["seconds"] for variant in variants)
     weathered = sum(row["kept"] is None for row in rows)
     yield (
-        f"{len(rows)} objects of {len({row['mesh'] for row in rows})} meshes, {weathered} weathered, "
-        f"{len(variants)} results, about {seconds:,.0f} s of work"
+        f"objects: {len(rows)}, weathered: {weathered}; meshes: {len({row['mesh'] for row in rows})}; "
+        f"results: {len(variants)}, about {seconds:,.0f} s of work"
     )
 
 
