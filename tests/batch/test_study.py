@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from weathercoat.batch.job import Job
@@ -110,6 +110,7 @@ def test_seed_and_config_can_be_drawn() -> None:
 KEYS = ["curl.radius=uniform(0.1,0.9)", "dust.rate=log(0.01,0.1)", "rust.bare_rate=normal(0.5,0.01)"]
 
 
+@settings(max_examples=30)
 @given(
     st.lists(st.sampled_from(["oak", "elm", "ash", "fir"]), min_size=1, unique=True),
     st.lists(st.sampled_from(KEYS), unique=True),
