@@ -17,14 +17,13 @@ from threading import Thread, Timer
 import pytest
 
 from tests.batch.jobs import make_broken_job, make_job, make_task, result_bytes
+from weathercoat.batch.cluster import DaskExecutor
 from weathercoat.batch.job import Job, Outcome, Task
 from weathercoat.batch.processes import InlineExecutor
 from weathercoat.errors import ClusterError, UsageError
 from weathercoat.output.folder import CHECKPOINT_STATE, RunFolder
 
 Client = pytest.importorskip("distributed").Client
-
-from weathercoat.batch.cluster import DaskExecutor
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="workers are killed by signals")
 

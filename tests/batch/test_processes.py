@@ -8,12 +8,15 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
 from tests.batch.jobs import make_broken_job, make_job, make_task, result_bytes
 from weathercoat.batch.job import Outcome, Progress
 from weathercoat.batch.processes import InlineExecutor, ProcessExecutor
+from weathercoat.batch.work import do_task
+from weathercoat.lock import FolderLock
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds children in /proc")
 
@@ -106,6 +109,18 @@ for event in ProcessExecutor(2).run(tasks):
     while any(is_running(worker) for worker in workers):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_a_task_waits_for_who_is_at_its_target(tmp_path: Path) -> None:
+    job = make_job(tmp_path, "a")
+    lock = FolderLock(tmp_path / "a.partial")
+    (tmp_path / "a.partial").mkdir()
+    assert lock.take()
+    assert do_task(make_task(job, tmp_path), seconds_to_wait=0.0).error["code"] == "E-BUSY"
+    timer = Timer(0.5, lambda: lock.release(remove=False))
+    timer.start()
+    assert do_task(make_task(job, tmp_path)).status == "done"
+    timer.join()
 
 
 def is_running(pid: int) -> bool:

@@ -32,7 +32,6 @@ from weathercoat.cost import in_megabytes
 from weathercoat.errors import (
     ClusterError,
     LimitError,
-    OutputBusyError,
     UsageError,
     WorkerError,
     internal_error,
@@ -49,7 +48,6 @@ SECONDS_WITHOUT_WORKERS = 60.0
 _SECONDS_BETWEEN_LOOKS = 1.0
 _SECONDS_OF_A_CALL = 10.0
 _SECONDS_BETWEEN_PROGRESS = 0.5
-_SECONDS_BETWEEN_TRIES = 1.0
 _SHARE_OF_MEMORY = 0.9  # a nanny ends its worker at 0.95
 
 
@@ -440,16 +438,8 @@ def work(task: Task, topic: str) -> Outcome:
     worker = get_worker()
     wanted = _Wanted(worker)
     tell = _Teller(partial(worker.log_event, topic), worker.get_current_task())
-    waits_until = time.monotonic() + 60.0 + 10.0 * task.seconds
     try:
-        while True:
-            outcome = do_task(task, tell, wanted)
-            is_busy = outcome.error is not None and outcome.error["code"] == OutputBusyError.code
-            if not is_busy or time.monotonic() > waits_until:
-                return outcome
-            time.sleep(_SECONDS_BETWEEN_TRIES)
-            if wanted.is_asked:
-                wanted.stop()
+        return do_task(task, tell, wanted, seconds_to_wait=60.0 + 10.0 * task.seconds)
     except _Unwanted:
         return Outcome(task.job.name, "dropped")
 

@@ -11,16 +11,26 @@ from typing import Any
 
 from weathercoat.batch.job import Job, Outcome, Status, Task
 from weathercoat.batch.storage import fetch, is_url, publish, read_report
-from weathercoat.errors import CorruptError, ResumeError, WeathercoatError, internal_error
+from weathercoat.errors import CorruptError, OutputBusyError, ResumeError, WeathercoatError, internal_error
 from weathercoat.resume import fingerprint
 from weathercoat.run import hash_inputs, run_asset
 from weathercoat.sim.recorders import Patience
 
+SECONDS_TO_WAIT = 10.0
+_SECONDS_BETWEEN_TRIES = 0.2
+
 
 def do_task(
-    task: Task, progress: Callable[[int, int], None] | None = None, patience: Patience | None = None
+    task: Task,
+    progress: Callable[[int, int], None] | None = None,
+    patience: Patience | None = None,
+    *,
+    seconds_to_wait: float = SECONDS_TO_WAIT,
 ) -> Outcome:
     """Run a task and return how it ended; only what stops the whole process is raised.
+
+    Where another process is at its target, such as the worker of a batch that was killed a moment ago, it
+    waits until that has ended, up to `seconds_to_wait`.
 
     What an interrupted run of the same job has left is gone on from; the result of another one, such as with
     a config that has changed since, is replaced once the new one is whole. Models and targets at URLs go
@@ -49,7 +59,7 @@ def do_task(
 
         out.parent.mkdir(parents=True, exist_ok=True)
         try:
-            report = attempt(resume=True)
+            report = _when_free(lambda: attempt(resume=True), seconds_to_wait, patience)
         except (ResumeError, CorruptError) as found:
             if not _is_within(found.file, str(out)):
                 raise
@@ -69,6 +79,22 @@ def do_task(
         error = raised if isinstance(raised, WeathercoatError) else internal_error(raised)
         seconds = time.perf_counter() - started
         return Outcome(task.job.name, "failed", seconds, None, error.as_dict(), tuple(messages))
+
+
+def _when_free(
+    attempt: Callable[[], dict[str, Any]], seconds: float, patience: Patience | None
+) -> dict[str, Any]:
+    """What an attempt returns, once no other process is at its target."""
+    waits_until = time.monotonic() + seconds
+    while True:
+        try:
+            return attempt()
+        except OutputBusyError:
+            if time.monotonic() > waits_until:
+                raise
+        time.sleep(_SECONDS_BETWEEN_TRIES)
+        if patience is not None and patience.is_asked:
+            patience.stop()
 
 
 @contextmanager
