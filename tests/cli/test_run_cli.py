@@ -238,7 +238,9 @@ def test_other_lost_exceptions_are_shown(restored_signals: None, capsys: pytest.
 
 
 @pytest.fixture
-def restored_signals() -> Iterator[None]:
+def restored_signals(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    # the watchdog would end the tests where the machine is busy
+    monkeypatch.setattr("weathercoat.cli.watchdog.SECONDS_TO_BE_HEARD", 60.0)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     hook = sys.unraisablehook
     yield

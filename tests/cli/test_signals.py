@@ -21,8 +21,10 @@ COMMAND = [sys.executable, "-m", "weathercoat"]
 
 
 @pytest.fixture
-def handlers() -> object:
+def handlers(monkeypatch: pytest.MonkeyPatch) -> object:
     """The handlers of a process that raises signals; what was there comes back."""
+    # the watchdog would end the tests where the machine is busy
+    monkeypatch.setattr("weathercoat.cli.watchdog.SECONDS_TO_BE_HEARD", 60.0)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     hook = sys.unraisablehook
     raise_signals()
