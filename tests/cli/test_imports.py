@@ -31,6 +31,8 @@ print("LOADED", code, *loaded)
         ["inspect", "--help"],
         ["render", "--help"],
         ["verify", "--help"],
+        ["baseline", "--help"],
+        ["baseline", "check", "--help"],
         ["bench", "--help"],
         ["bench", "speed", "--help"],
         ["warmup", "--help"],

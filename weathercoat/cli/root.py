@@ -17,6 +17,7 @@ SUBCOMMANDS = (
     "run",
     "batch",
     "scene",
+    "baseline",
     "plan",
     "config",
     "sample",
