@@ -12,11 +12,12 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all test-plain test-bounds coverage fuzz lint docs bench charts venv dev clean
+.PHONY: help demo test test-all test-plain test-bounds golden coverage fuzz lint docs bench charts venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
 	@echo "make test      run the tests (make test-all: the long ones too)"
+	@echo "make golden    record anew what tests compare results with, after a change of results that is meant"
 	@echo "make coverage  run the core's tests without the JIT, and say what they reach"
 	@echo "make fuzz      damaged files and configs, runs at the bounds: for FUZZ_SECONDS=1200, from FUZZ_SEED (the date)"
 	@echo "make lint      style, types and import contracts"
@@ -66,6 +67,16 @@ test-plain: dev
 
 test-bounds: dev
 	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --numprocesses auto $(CORE_TESTS)
+
+# What tests/comparison/test_golden.py holds results against.
+golden: venv
+	@rm -rf build/golden && mkdir -p build/golden
+	$(BIN)/weathercoat sample plate -o build/golden/plate.obj
+	$(BIN)/weathercoat sample bracket -o build/golden/bracket.obj
+	$(BIN)/weathercoat baseline record build/golden/baseline build/golden/plate.obj build/golden/bracket.obj \
+		--faces 2000 --steps 200 --set snapshots.count=3
+	@mkdir -p tests/golden
+	cp build/golden/baseline/baseline.json tests/golden/
 
 coverage: test-plain
 	$(BIN)/coverage report --include "weathercoat/mesh/*,weathercoat/sim/*" --fail-under 0
