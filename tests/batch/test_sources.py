@@ -225,3 +225,10 @@ def test_a_job_is_the_same_whatever_else_is_there(stems: list[str], random: Any)
     random.shuffle(models)
     together = collect_jobs(models, **study)
     assert sorted(alone, key=lambda job: job.name) == sorted(together, key=lambda job: job.name)
+
+
+def test_folders_pass_over_extensions_that_mostly_belong_to_other_things(tmp_path: Path) -> None:
+    for name in ("a.obj", "readme.xml", "values.dat"):
+        (tmp_path / name).touch()
+    assert [job.name for job in collect_jobs([str(tmp_path)])] == ["a"]
+    assert [job.name for job in collect_jobs([str(tmp_path / "values.dat")])] == ["values"]

@@ -29,7 +29,9 @@ from weathercoat.errors import ConfigProblem, UsageError
 from weathercoat.mesh.formats.sniff import FOREIGN, OWN
 from weathercoat.output.folder import REPORT
 
-_EXTENSIONS = frozenset(f".{name}" for name in (*OWN, *FOREIGN))
+# Extensions that mostly belong to other things than models; such files are taken where they are named.
+_AMBIGUOUS = {"avs", "dat", "dato", "e", "ele", "fem", "inp", "node", "post", "tec", "wkt", "xml"}
+_EXTENSIONS = frozenset(f".{name}" for name in {*OWN, *FOREIGN} - _AMBIGUOUS)
 
 
 def collect_jobs(
