@@ -90,7 +90,7 @@ def command(
     already and unchanged is not done again.
 
     \b
-    weathercoat sample yard -o yard.yaml
+    weathercoat sample yard -o yard.glb
     weathercoat scene yard.yaml -c rusting -o aged
     """
     from weathercoat.cli.batch import Teller, make_executor, pool_size
@@ -114,16 +114,17 @@ def command(
             _say_plan(plan, scene.name, as_json=as_json)
             return
         size = pool_size("processes", workers)
+        limit = memory_limit(max_memory)
         teller = Teller(messages, as_json=as_json)
         report = age_scene(
             plan,
             scene.name,
             out,
-            make_executor("processes", size, None, memory_limit(max_memory)),
+            make_executor("processes", size, None, limit),
             workers=size,
             threads=options.threads_beside(size),
             check=check,
-            max_memory=max_memory,
+            max_memory=None if limit is None else round(limit.bytes),
             preview=preview,
             begin=teller.begin,
             listen=teller,

@@ -34,8 +34,12 @@ class Normalisation:
     @classmethod
     def of(cls, snapshot: Snapshot) -> Normalisation:
         """Of a snapshot's substrate, which is the same in all snapshots of a run."""
-        vertices = snapshot.substrate_vertices
-        size = float(np.sqrt(face_areas(vertices, snapshot.substrate_faces).sum()))
+        return cls.of_mesh(snapshot.substrate_vertices, snapshot.substrate_faces)
+
+    @classmethod
+    def of_mesh(cls, vertices: Vectors, faces: Indices) -> Normalisation:
+        """Of vertices (k, 3) and faces (t, 3)."""
+        size = float(np.sqrt(face_areas(vertices, faces).sum()))
         return cls(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)), size)
 
     def __call__(self, points: Vectors) -> Vectors:
@@ -193,6 +197,14 @@ def _film(
 def make_bare_mesh(vertices: Vectors, faces: Indices) -> DisplayMesh:
     """The display mesh of vertices (k, 3) and faces (t, 3) that carry no paint."""
     return _part(vertices, ((faces, BARE_PART),), _METAL_CREASE)
+
+
+def make_painted_mesh(vertices: Vectors, faces: Indices, paint: Vectors) -> DisplayMesh:
+    """The display mesh of vertices (k, 3) and faces (t, 3) under whole paint of the linear colour `paint`
+    (3,).
+    """
+    scalars = {"layer": np.ones(len(vertices)), "color": np.tile(paint, (len(vertices), 1))}
+    return _part(vertices, ((faces, FRONT),), _METAL_CREASE, scalars)
 
 
 def join_meshes(parts: Sequence[DisplayMesh]) -> DisplayMesh:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from weathercoat.mesh.surface import Surface, Vectors, vertex_normals
+from weathercoat.mesh.surface import Vectors
 from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import (
     DisplayMesh,
@@ -16,6 +16,7 @@ from weathercoat.output.display import (
     join_meshes,
     make_bare_mesh,
     make_display_mesh,
+    make_painted_mesh,
 )
 from weathercoat.output.folder import whole_file
 from weathercoat.output.pictures import Image, PictureParameters, contact_sheet, render_mesh, write_png
@@ -24,7 +25,6 @@ from weathercoat.recording import picture_parameters
 from weathercoat.scene.exposure import ground_level
 from weathercoat.scene.graph import AgedMesh, CameraPath, SceneObject, place
 from weathercoat.scene.plan import ScenePlan, VariantPlan
-from weathercoat.sim.snapshot import Snapshot
 
 HEIGHT, MOST_WIDTH = 600, 1200  # pixels of each picture
 MOST_FACES = 12_000_000  # of all instances together, some 4 GB
@@ -109,46 +109,25 @@ def _variant_mesh(shown: VariantPlan, film: AgedMesh | None) -> tuple[DisplayMes
     """The display mesh of a variant in units of its own size, so that its paint looks as in its own pictures;
     with fresh paint where there is no film yet.
     """
-    snapshot = _fresh(shown.painted) if film is None else film.snapshot
-    normalise = Normalisation.of(snapshot)
     parameters = picture_parameters(shown.loaded.config)
-    mesh = make_display_mesh(
-        snapshot,
-        normalise,
-        film_thickness=parameters.film_thickness,
-        metal_thickness=parameters.metal_thickness,
-        paint=to_linear(parameters.paint),
-        untouched=shown.untouched,
-    )
-    return mesh, normalise
-
-
-def _fresh(surface: Surface) -> Snapshot:
-    """A surface under whole paint."""
-    vertices, faces = surface.vertices, surface.faces
-    zero, no = np.zeros(len(vertices)), np.zeros(len(vertices), np.bool_)
-    colors = np.zeros((len(vertices), 3))
-    origin = np.arange(len(vertices), dtype=np.int32)
-    return Snapshot(
-        step=0,
-        age=0.0,
-        film_vertices=vertices,
-        film_faces=faces,
-        film_face=np.arange(len(faces), dtype=np.int32),
-        film_origin=origin,
-        film_rust=zero,
-        separated=no,
-        separation_age=zero,
-        adhesion=zero,
-        film_color=colors,
-        substrate_vertices=vertices,
-        substrate_normals=vertex_normals(vertices, faces),
-        substrate_faces=faces,
-        substrate_rust=zero,
-        dust=zero,
-        bare=no,
-        substrate_color=colors,
-    )
+    paint = to_linear(parameters.paint)
+    if film is not None:
+        normalise = Normalisation.of(film.snapshot)
+        mesh = make_display_mesh(
+            film.snapshot,
+            normalise,
+            film_thickness=parameters.film_thickness,
+            metal_thickness=parameters.metal_thickness,
+            paint=paint,
+            untouched=film.untouched,
+        )
+        return mesh, normalise
+    surface = shown.painted
+    normalise = Normalisation.of_mesh(surface.vertices, surface.faces)
+    parts = [make_painted_mesh(normalise(surface.vertices), surface.faces, paint)]
+    if shown.untouched is not None:
+        parts.append(make_bare_mesh(normalise(shown.untouched.vertices), shown.untouched.faces))
+    return join_meshes(parts), normalise
 
 
 def _placed(
