@@ -159,7 +159,7 @@ def check(
 
 
 def _teller_and_executor(messages: Any, workers: int | None) -> tuple[Any, Executor]:
-    from weathercoat.cli.batch import Teller, make_executor, pool_size
+    from weathercoat.cli.executing import Teller, make_executor, pool_size
     from weathercoat.memory import memory_limit
 
     size = pool_size("processes", workers)

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from weathercoat.cli import options
 from weathercoat.errors import BatchError, UsageError
-
-if TYPE_CHECKING:
-    from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
-    from weathercoat.memory import MemoryLimit
 
 _MOST_ROWS = 50  # of the table at the end; batch.json has all
 _MOST_NAMES = 5  # of the message about what failed
@@ -109,7 +105,9 @@ def command(
     """
     from weathercoat.batch.batch import run_batch
     from weathercoat.batch.sources import collect_jobs
+    from weathercoat.cli.executing import Teller, make_executor, pool_size
     from weathercoat.cli.messages import Messages
+    from weathercoat.cli.pricing import price_lines, price_of
     from weathercoat.memory import memory_limit
 
     if (kind == "dask") != (scheduler is not None):
@@ -132,7 +130,10 @@ def command(
     size = pool_size(kind, workers)
     limit = memory_limit(max_memory)
     if dry_run:
-        _say_price(found, output, size, limit, as_json=as_json)
+        price = price_of(found, output, size, limit)
+        click.echo(
+            json.dumps(price, indent=2, ensure_ascii=False) if as_json else "\n".join(price_lines(price))
+        )
         return
     if limit is not None and kind == "processes":
         max_memory = round(limit.bytes)  # of all workers, which do not ask again while others are at work
@@ -161,89 +162,6 @@ def command(
         raise BatchError(f"{len(failed)} of {len(found)} jobs failed: {listed}", file=output)
 
 
-def pool_size(kind: str, workers: int | None) -> int:
-    from weathercoat.deform.team import usable_cores
-
-    return 1 if kind == "in-process" else workers or usable_cores()
-
-
-def make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimit | None) -> Executor:
-    from weathercoat.batch.processes import InlineExecutor, ProcessExecutor
-
-    if kind == "in-process":
-        from weathercoat.cli.signals import Patience
-
-        return InlineExecutor(Patience)
-    if kind == "dask":
-        from weathercoat.batch.cluster import DaskExecutor
-
-        assert scheduler is not None
-        return DaskExecutor(scheduler)
-    return ProcessExecutor(size, float("inf") if limit is None else limit.bytes)
-
-
-class Teller:
-    """Tells of each event: a line for each job that has ended, and a bar over all work in between."""
-
-    def __init__(self, messages: Any, *, as_json: bool) -> None:
-        self._messages = messages
-        self._as_json = as_json
-        self._expected: dict[str, float] = {}
-        self._shares: dict[str, float] = {}
-        self._ended = 0
-
-    def begin(self, tasks: Sequence[Task]) -> None:
-        """Learn what there is to do."""
-        self._expected = {task.job.name: max(task.seconds, 0.1) for task in tasks}
-
-    def __call__(self, event: Progress | Outcome) -> None:
-        """Tell of an event."""
-        from weathercoat.batch.job import Outcome
-
-        if isinstance(event, Outcome):
-            self._shares[event.name] = 1.0
-            self._ended += event.name in self._expected
-            self._tell_end(event)
-        else:
-            self._shares[event.name] = event.done / event.total
-        if self._expected:
-            known = (self._expected.get(name, 0.0) * share for name, share in self._shares.items())
-            self._messages.share(
-                sum(known) / sum(self._expected.values()), f"{self._ended} of {len(self._expected)} jobs"
-            )
-
-    def _tell_end(self, outcome: Outcome) -> None:
-        if self._as_json:
-            click.echo(json.dumps({"event": "job", **_as_dict(outcome)}, ensure_ascii=False))
-            return
-        for line in outcome.messages:
-            self._messages.log(f"{outcome.name}: {line}")
-        if outcome.status != "unchanged":
-            self._messages.log(_line(outcome))
-
-
-def _as_dict(outcome: Outcome) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return {**asdict(outcome), "seconds": round(outcome.seconds, 3)}
-
-
-def _line(outcome: Outcome) -> str:
-    if outcome.error is not None:
-        error = outcome.error
-        where = f"{error['file']}: " if error["file"] else ""
-        return f"{outcome.name}: failed: {where}{error['code']}: {error['message']}; {error['remedy']}"
-    return f"{outcome.name}: {outcome.status} in {outcome.seconds:.1f} s" + "".join(
-        f", {text}" for text in _figures(outcome.figures)
-    )
-
-
-def _figures(figures: Any) -> Iterator[str]:
-    if figures:
-        yield f"{figures['separated_share']:.0%} separated"
-        yield f"{figures['lost_share']:.0%} lost"
-
-
 def _table(record: dict[str, Any]) -> Iterator[str]:
     """What became of the jobs, one line each where there are not too many, and how many of each kind."""
     rows = record["jobs"]
@@ -264,58 +182,3 @@ def _table(record: dict[str, Any]) -> Iterator[str]:
         yield line
     counts = ", ".join(f"{count} {status}" for status, count in record["counts"].items() if count)
     yield f"{len(record['jobs'])} jobs: {counts}; {record['seconds']:.1f} s"
-
-
-def _say_price(
-    jobs: Sequence[Job], output: str, workers: int, limit: MemoryLimit | None, *, as_json: bool
-) -> None:
-    """What a batch would do and take, without running it."""
-    from weathercoat.batch.batch import sort_out
-    from weathercoat.batch.price import price_job, seconds_together, total_price
-    from weathercoat.cost import in_megabytes
-
-    unchanged, left = sort_out(jobs, output)
-    prices = {job.name: price_job(job) for job in left}
-    total = total_price(prices)
-    seconds = seconds_together(list(prices.values()), workers)
-    too_large = [name for name, price in prices.items() if limit and price.memory > limit.bytes]
-    if as_json:
-        content = {
-            "jobs": [
-                {"name": name, **{key: round(value, 1) for key, value in price._asdict().items()}}
-                for name, price in prices.items()
-            ],
-            "unchanged": len(unchanged),
-            "workers": workers,
-            "seconds": round(seconds, 1),
-            "seconds_of_work": round(total.seconds, 1),
-            "largest_memory": round(total.memory),
-            "disk": round(total.disk),
-            "too_large": too_large,
-        }
-        click.echo(json.dumps(content, indent=2, ensure_ascii=False))
-        return
-    shown = sorted(prices.items(), key=lambda item: -item[1].seconds)[:_MOST_ROWS]
-    width = max((len(name) for name, _ in shown), default=4)
-    if shown:
-        click.echo(f"{'job':{width}} {'seconds':>8} {'memory':>10} {'disk':>10}")
-    for name, price in shown:
-        memory, disk = in_megabytes(price.memory), in_megabytes(price.disk)
-        click.echo(f"{name:{width}} {price.seconds:8.1f} {memory:>10} {disk:>10}")
-    if len(prices) > len(shown):
-        click.echo(f"... and {len(prices) - len(shown)} that take less")
-    click.echo(
-        f"{len(left)} of {len(jobs)} jobs to do: about {_duration(seconds)} with {workers} workers, "
-        f"{in_megabytes(total.disk)} on disk, {in_megabytes(total.memory)} of memory for the largest"
-    )
-    for name in too_large:
-        click.echo(f"{name} needs more memory than there is")
-
-
-def _duration(seconds: float) -> str:
-    """A time for people."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -93,7 +93,7 @@ def command(
     weathercoat sample yard -o yard.glb
     weathercoat scene yard.yaml -c rusting -o aged
     """
-    from weathercoat.cli.batch import Teller, make_executor, pool_size
+    from weathercoat.cli.executing import Teller, make_executor, pool_size
     from weathercoat.cli.messages import Messages
     from weathercoat.memory import memory_limit
     from weathercoat.run import report_compiling
