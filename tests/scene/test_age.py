@@ -115,6 +115,13 @@ def test_a_second_time_nothing_is_done_and_all_is_the_same(aged: tuple[Path, dic
     assert [(out / name).read_bytes() for name in files] == was
 
 
+def test_another_folder_gets_the_same_bytes(aged: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    out, _ = aged
+    age(shed(camera=looking((0, 2, 20))), tmp_path)
+    for name in ("scene.glb", "scene.json"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
+
+
 def test_only_what_a_rule_changes_is_done_again(tmp_path: Path) -> None:
     age(shed(), tmp_path)
     _, statuses = age(shed(Rule("roof", set={"rust.bare_rate": 1.0})), tmp_path)
