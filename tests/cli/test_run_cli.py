@@ -155,15 +155,6 @@ def test_errors_of_remeshing_name_the_model(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["strip.obj"]
 
 
-def test_a_run_has_no_standard_output_for_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["run", "standard", "model.obj", "-o", "-"]) == 2
-    assert capsys.readouterr().err == (
-        "weathercoat: E-USAGE: the results are a folder, not a stream; name the folder with -o\n"
-    )
-    assert call(["remesh", "model.obj", "-o", "-", "--json"]) == 2
-    assert "both write to standard output" in capsys.readouterr().err
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb"])
 def test_remeshed_files_stand_upright(

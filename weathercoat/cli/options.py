@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,6 +126,17 @@ def threads_beside(workers: int) -> int:
     from weathercoat.deform.team import usable_cores
 
     return max(1, min(MOST_THREADS, usable_cores() // workers))
+
+
+def to(formats: Sequence[str], about: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option --to, the format of a mesh that is written."""
+    return click.option("--to", "to", type=click.Choice(formats), help=about)
+
+
+def require_one_reader(config: str, model: str) -> None:
+    """Raise UsageError where both CONFIG and MODEL would read standard input."""
+    if config == model == "-":
+        raise UsageError("config and model cannot both be standard input", remedy="give a file for one")
 
 
 def portable(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -47,6 +47,7 @@ def command(
     *configs, model = config_and_model
     for config in configs:
         options.require_config_first(config, model)
+        options.require_one_reader(config, model)
     shortcuts = options.shortcuts(quality=quality, steps=steps, faces=faces)
     loaded = load_config(configs[0] if configs else "standard", [*assignments, *shortcuts])
     with Messages(quiet=as_json) as messages, report_compiling(messages.log), name_errors(model):

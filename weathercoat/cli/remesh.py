@@ -8,13 +8,14 @@ from pathlib import Path
 import click
 
 from weathercoat.cli import options
-from weathercoat.cli.writing import STANDARD_OUTPUT, WHERE, open_mesh, say_written
+from weathercoat.cli.writing import MESH_FORMATS, STANDARD_OUTPUT, WHERE, open_mesh, say_written
 from weathercoat.errors import UsageError
 
 
 @click.command()
 @options.model
 @options.output(WHERE, required=True)
+@options.to(MESH_FORMATS, "Format of the output, whatever its extension.")
 @click.option(
     "--faces", type=click.IntRange(4, 20_000_000), default=10_000, show_default=True, help="Wanted faces."
 )
@@ -36,6 +37,7 @@ from weathercoat.errors import UsageError
 def command(
     model: str,
     output: Path,
+    to: str | None,
     faces: int,
     crease_angle: float,
     seed: int,
@@ -62,7 +64,7 @@ def command(
     with (
         Messages(quiet=quiet or as_json) as messages,
         report_compiling(messages.log),
-        open_mesh(output, overwrite=overwrite) as write,
+        open_mesh(output, overwrite=overwrite, to=to) as write,
         name_errors(model),
     ):
         surface = read_model(model, model_format)

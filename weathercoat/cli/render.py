@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from weathercoat.cli import options
-from weathercoat.cli.writing import say_written
+from weathercoat.cli.writing import STANDARD_OUTPUT, open_output, say_written
 from weathercoat.errors import CorruptError, UsageError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("run", type=click.Path(path_type=Path))
-@options.output("The PNG.", required=True)
+@options.output("The PNG; - for standard output.", required=True)
 @click.option(
     "--step", type=int, metavar="N", help="Draw the snapshot of this step alone, not a sheet of all."
 )
@@ -36,14 +36,15 @@ def command(
 ) -> None:
     """Draw RUN, the folder of a finished run or its folder of snapshots, as a PNG."""
     from weathercoat.cli.messages import Messages
-    from weathercoat.output.folder import whole_file
     from weathercoat.output.pictures import write_png
     from weathercoat.run import report_compiling
 
+    if as_json and output == STANDARD_OUTPUT:
+        raise UsageError("--json and -o - both write to standard output", remedy="give a file to -o")
     with (
         Messages(quiet=as_json) as messages,
         report_compiling(messages.log),
-        whole_file(output, overwrite=overwrite) as stream,
+        open_output(output, "a PNG", overwrite=overwrite) as stream,
     ):
         image = _draw(run, step, {name: value for name, value in view.items() if value is not None})
         write_png(stream, image)  # type: ignore[arg-type]

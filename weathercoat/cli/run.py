@@ -13,16 +13,18 @@ from typing import Any
 import click
 
 from weathercoat import unfinished
-from weathercoat.cli import options
+from weathercoat.cli import filter, options
 from weathercoat.cli.messages import Messages
 from weathercoat.cli.signals import Patience
+from weathercoat.cli.writing import STANDARD_OUTPUT, refuse_terminal, send
 from weathercoat.errors import UsageError
 
 
 @click.command()
 @options.config
 @options.model
-@options.output("Folder of the results; MODEL-CONFIG by default.")
+@options.output("Folder of the results, MODEL-CONFIG by default; - for the aged mesh on standard output.")
+@options.to(filter.FORMATS, "Format of the aged mesh on standard output; glb by default.")
 @options.assignments
 @options.quality
 @options.seed
@@ -44,6 +46,7 @@ def command(
     config: str,
     model: str,
     output: Path | None,
+    to: str | None,
     assignments: tuple[str, ...],
     quality: str | None,
     seed: int | None,
@@ -62,46 +65,68 @@ def command(
 ) -> None:
     """Age the paint of MODEL by the rules of CONFIG.
 
-    CONFIG is a YAML file or the name of a shipped config (see `weathercoat config list`). MODEL is a mesh,
-    or - for standard input. The folder of the results appears only once it is whole; a run that was
-    interrupted leaves what it has in FOLDER.partial, from where --resume goes on.
+    CONFIG is a YAML file or the name of a shipped config (see `weathercoat config list`), MODEL a mesh; one
+    of them may be - for standard input. The folder of the results appears only once it is whole; a run that
+    was interrupted leaves what it has in FOLDER.partial, from where --resume goes on.
     """
     from weathercoat.config.load import load_config
     from weathercoat.output.folder import safe_name
 
     if overwrite and resume:
         raise UsageError("--resume goes on, and --overwrite begins anew", remedy="give one of them")
-    if output == Path("-"):
-        raise UsageError("the results are a folder, not a stream", remedy="name the folder with -o")
+    is_filter = output == STANDARD_OUTPUT
+    kind = to or filter.FORMATS[0]
+    if is_filter:
+        _require_filter(kind, resume=resume, overwrite=overwrite, as_json=as_json)
+    elif to:
+        remedy = "add -o -, or choose formats of the folder with --set output.formats="
+        raise UsageError("--to is the format on standard output", remedy=remedy)
     options.require_config_first(config, model)
-    loaded = load_config(
-        config, [*assignments, *options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)]
-    )
+    options.require_one_reader(config, model)
+    shortcuts = options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)
+    extra = filter.settings(kind) if is_filter else ()
+    loaded = load_config(config, [*assignments, *shortcuts, *extra])
     is_piped = model == "-"
     stem = "model" if is_piped else Path(model).stem
     folder = output or Path(safe_name(f"{stem}-{Path(config).stem}"))
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages, _say_how_to_go_on():
         from weathercoat.run import run_asset
 
-        report = run_asset(
-            loaded,
-            sys.stdin.buffer if is_piped else model,
-            folder,
-            format=model_format,
-            overwrite=overwrite,
-            resume=resume,
-            strict=strict,
-            check=check,
-            max_memory=max_memory,
-            threads=threads or options.threads_beside(1),
-            progress=messages.progress,
-            log=messages.log,
-            patience=Patience(),
-        )
+        def run(out: Path) -> dict[str, Any]:
+            return run_asset(
+                loaded,
+                sys.stdin.buffer if is_piped else model,
+                out,
+                format=model_format,
+                overwrite=overwrite,
+                resume=resume,
+                strict=strict,
+                check=check,
+                max_memory=max_memory,
+                threads=threads or options.threads_beside(1),
+                progress=messages.progress,
+                log=messages.log,
+                patience=None if is_filter else Patience(),
+            )
+
+        if is_filter:
+            send(filter.aged_mesh(run, kind))
+            return
+        report = run(folder)
     if as_json:
         click.echo(json.dumps(report, indent=2, ensure_ascii=False))
     elif not quiet:
         click.echo("\n".join([*_table(report), f"written to {folder}"]))
+
+
+def _require_filter(kind: str, *, resume: bool, overwrite: bool, as_json: bool) -> None:
+    """Raise UsageError where what is asked for needs a folder, or standard output for itself."""
+    if as_json:
+        raise UsageError("--json and -o - both write to standard output", remedy="give a folder to -o")
+    if resume or overwrite:
+        raise UsageError("-o - keeps nothing to go on from or to replace", remedy="give a folder to -o")
+    if kind != "obj":
+        refuse_terminal(kind.upper())
 
 
 @contextmanager

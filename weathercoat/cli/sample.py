@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import click
 
 from weathercoat.cli import options
-from weathercoat.cli.writing import WHERE, open_mesh, say_written
+from weathercoat.cli.writing import MESH_FORMATS, WHERE, open_mesh, say_written
 
 _YARD = "yard"
 
@@ -57,14 +57,19 @@ def _yard(output: Path | None, overwrite: bool, as_json: bool) -> None:
 
 def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
     def write(
-        output: Path | None, size: float | None, overwrite: bool, as_json: bool, **arguments: float
+        output: Path | None,
+        to: str | None,
+        size: float | None,
+        overwrite: bool,
+        as_json: bool,
+        **arguments: float,
     ) -> None:
-        path = output or Path(f"{name}.obj")
+        path = output or Path(f"{name}.{to or 'obj'}")
         surface = make(**arguments)
         if size is not None:
             extent = (surface.vertices.max(axis=0) - surface.vertices.min(axis=0)).max()
             surface = replace(surface, vertices=surface.vertices * (size / extent))
-        with open_mesh(path, overwrite=overwrite) as write_surface:
+        with open_mesh(path, overwrite=overwrite, to=to) as write_surface:
             write_surface(surface)
         say_written(path, as_json=as_json)
 
@@ -80,5 +85,6 @@ def _make_command(name: str, make: Callable[..., Any]) -> click.Command:
         kind, about = annotated[parameter.name].__origin__, annotated[parameter.name].__metadata__[0]
         flag = f"--{parameter.name.replace('_', '-')}"
         write = click.option(flag, type=kind, default=parameter.default, show_default=True, help=about)(write)
+    write = options.to(MESH_FORMATS, "Format of the output, whatever its extension.")(write)
     write = options.output(f"{WHERE} Default: {name}.obj.")(write)
     return click.command(name, help=inspect.getdoc(make))(write)

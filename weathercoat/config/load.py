@@ -176,6 +176,8 @@ def _preset_layer(name: str) -> _Layer:
 
 
 def _read_file(source: str) -> bytes:
+    if source == "-":
+        return sys.stdin.buffer.read(LARGEST_FILE + 1)
     try:
         mode = Path(source).stat().st_mode
         if stat.S_ISFIFO(mode):
