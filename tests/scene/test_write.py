@@ -228,6 +228,46 @@ def test_animations_and_skins_keep_their_accessors(tmp_path: Path) -> None:
     assert [mesh["name"] for mesh in out["meshes"]] == ["skinned", "v"]
 
 
+def test_materials_and_pictures_go_with_what_alone_shows_them(tmp_path: Path) -> None:
+    document = Document()
+    document.json["bufferViews"] += [{"buffer": 0, "byteLength": 4 * i} for i in (1, 2, 3)]
+    document.body = bytes(12)
+    aged = document.mesh("aged", material=0)
+    shared = document.mesh("shared", material=1)
+    kept = document.mesh("kept", material=1)
+    several = document.mesh("several", material=2)
+    document.json["meshes"][several]["primitives"].append(
+        {**document.json["meshes"][several]["primitives"][0], "material": 3}
+    )
+    extensions = {"KHR_materials_variants": {"mappings": [{"material": 4, "variants": [0]}]}}
+    document.json["meshes"][kept]["primitives"][0]["extensions"] = extensions
+    for name, mesh in (("a", aged), ("b", shared), ("c", kept), ("d", several)):
+        document.node(name=name, mesh=mesh)
+
+    def textured(name: str, index: int) -> dict[str, Any]:
+        coat = {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": index}}}
+        return {"name": name, "extensions": coat, "extras": {"index": index}}
+
+    path = document.write(
+        tmp_path / "in.glb",
+        materials=[textured("m0", 0), textured("m1", 1), {"name": "m2"}, {"name": "m3"}, textured("m4", 2)],
+        textures=[{"source": 0}, {"source": 1}, {"extensions": {"KHR_texture_basisu": {"source": 2}}}],
+        images=[{"bufferView": i, "mimeType": "image/png", "name": f"i{i}"} for i in range(3)],
+        extensionsUsed=["KHR_materials_variants", "KHR_materials_clearcoat", "KHR_texture_basisu"],
+    )
+    film = aged_cube()
+    out, _ = write(read_scene(path), tmp_path, {"a": "v", "b": "v", "d": "v"}, {"v": film})
+    assert [m["name"] for m in out["materials"]] == ["m1", "m2", "m3", "m4", "paint", "metal"]
+    assert [i["name"] for i in out["images"]] == ["i1", "i2"]
+    first = out["meshes"][0]["primitives"][0]
+    assert first["material"] == 0
+    assert first["extensions"]["KHR_materials_variants"]["mappings"][0]["material"] == 3
+    coats = [out["materials"][i]["extensions"]["KHR_materials_clearcoat"] for i in (0, 3)]
+    assert [coat["clearcoatTexture"]["index"] for coat in coats] == [0, 1]
+    assert out["textures"] == [{"source": 0}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]
+    assert [out["bufferViews"][i["bufferView"]]["byteLength"] for i in out["images"]] == [8, 12]
+
+
 def test_views_that_begin_between_words_are_read_the_same(tmp_path: Path) -> None:
     document = Document()
     document.node(name="a", mesh=document.mesh())
@@ -256,10 +296,12 @@ def test_accessors_stay_where_an_unknown_extension_may_mean_them(tmp_path: Path)
 
 def test_untouched_parts_keep_the_material_of_their_name(tmp_path: Path) -> None:
     document = Document()
-    document.node(name="cart", mesh=document.mesh(material=1))
-    path = document.write(
-        tmp_path / "in.glb", materials=[{"name": "metal"}, {"name": "rubber"}, {"name": "twice"}] * 1
-    )
+    cart = document.mesh(material=1)
+    primitives = document.json["meshes"][cart]["primitives"]
+    primitives.append({**primitives[0], "material": 2})
+    document.node(name="cart", mesh=cart)
+    materials = [{"name": "metal"}, {"name": "rubber"}, {"name": "body"}]
+    path = document.write(tmp_path / "in.glb", materials=materials)
     rubber = make_surface(CUBE.vertices + 2.0, CUBE.faces, groups=("rubber",))
     out, _ = write(read_scene(path), tmp_path, {"cart": "v"}, {"v": aged_cube(untouched=rubber)})
     primitives = out["meshes"][0]["primitives"]

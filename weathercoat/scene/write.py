@@ -157,7 +157,9 @@ class _Writer:
         tops = []
         for thing in self.scene.objects:
             tops.append(len(nodes))
-            node = {"name": thing.name, "matrix": _column_major(thing.transform)}
+            node: dict[str, Any] = {"name": thing.name}
+            if not np.array_equal(thing.transform, np.eye(4)):
+                node["matrix"] = _column_major(thing.transform)
             nodes.append(node)
             variant = self.aged.get(thing.name)
             self._show(nodes, node, self._unaged(thing.mesh) if variant is None else self._variant(variant))
