@@ -34,7 +34,7 @@ from weathercoat.mesh.repair import repair
 from weathercoat.mesh.surface import Surface
 from weathercoat.scene.cameras import animated_nodes, read_cameras
 from weathercoat.scene.graph import Scene, SceneObject, unique_names
-from weathercoat.scene.retained import INSTANCING
+from weathercoat.scene.retained import INSTANCING, check_retained
 
 # Shortest over longest axis of a transform below which what it places has no body: well above the rounding of
 # stretches, and below the thinnest sheet that is made of a block.
@@ -82,6 +82,7 @@ class _Reader:
             replace(thing, name=unique, path="/".join(path))
             for unique, path, thing in zip(unique_names(paths), paths, objects, strict=True)
         ]
+        check_retained(self.document)
         camera, passed = read_cameras(self.document, nodes)
         notes += passed + self._notes(nodes, named) + passed_over(self.document)
         return Scene(

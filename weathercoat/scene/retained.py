@@ -8,6 +8,7 @@ that lie beside the file, become one buffer.
 
 from __future__ import annotations
 
+import json
 import mimetypes
 from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
@@ -58,6 +59,25 @@ def retain(source: GltfDocument, buffer: GlbBuffer, shown: Iterable[int]) -> dic
     _embed_pictures(source, document, buffer)
     buffer.accessors += document.pop("accessors", [])
     return document
+
+
+def check_retained(source: GltfDocument) -> None:
+    """Raise CorruptError now for what would make `retain` or the writing fail, after hours of work maybe.
+
+    Call it within `malformed_is_corrupt`.
+    """
+    for shown in (range(len(source.json.get("meshes", []))), ()):
+        document = retain(source, _Sizes(), shown)
+        json.dumps(document, allow_nan=False)
+
+
+class _Sizes(GlbBuffer):
+    """A buffer that forgets its bytes."""
+
+    def add_bytes(self, content: bytes, **view: Any) -> int:
+        number = super().add_bytes(content, **view)
+        self.pieces.clear()
+        return number
 
 
 def _drop_accessors(document: dict[str, Any], dropped: Sequence[dict[str, Any]]) -> None:

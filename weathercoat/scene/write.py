@@ -18,7 +18,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from weathercoat import __version__
-from weathercoat.errors import CorruptError
 from weathercoat.mesh.formats.gltf_document import malformed_is_corrupt
 from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.folder import whole_file
@@ -49,8 +48,7 @@ def write_scene(
     are. films: the variants, each asked for once, so that the mapping may read them from files. Objects of
     YAML files that stay as they are keep their vertex colours or are grey, since their textures are not read.
 
-    Raises CorruptError for a source that contradicts itself where reading did not look, OutputExistsError,
-    OutputError; KeyError for a variant that is not there.
+    Raises OutputExistsError, OutputError; KeyError for a variant that is not there.
     """
     if isinstance(target, (str, Path)):
         with whole_file(target, overwrite=overwrite) as stream:
@@ -67,10 +65,7 @@ def write_scene(
         if values:
             document[key] = values
     document["buffers"] = [{"byteLength": writer.buffer.length}]
-    try:
-        write_document(target, document, writer.buffer.pieces)
-    except ValueError as error:
-        raise CorruptError(f"the scene has a number that JSON cannot hold: {error}") from None
+    write_document(target, document, writer.buffer.pieces)
 
 
 @dataclass
@@ -102,20 +97,19 @@ class _Writer:
             if thing.node is not None:
                 placed.setdefault(thing.node, []).append(thing)
         replaced = {n for n, things in placed.items() if all(t.name in self.aged for t in things)}
+        entries = source.json.get("nodes", [])
+        shown = [node["mesh"] for n, node in enumerate(entries) if "mesh" in node and n not in replaced]
         with malformed_is_corrupt():
-            entries = source.json.get("nodes", [])
-            shown = [node["mesh"] for n, node in enumerate(entries) if "mesh" in node and n not in replaced]
             document = retain(source, self.buffer, shown)
-            self.meshes = document["meshes"]
-            self.materials = document.pop("materials", [])
-            self.own_materials = _named_once(self.materials)
+        self.meshes = document["meshes"]
+        self.materials = document.pop("materials", [])
+        self.own_materials = _named_once(self.materials)
         for n, things in placed.items():
             if any(t.name in self.aged for t in things):
                 self._dress(document, n, things)
         if not self.meshes:
             del document["meshes"]
-        with malformed_is_corrupt():
-            _drop_instancing(document)
+        _drop_instancing(document)
         return document
 
     def _dress(self, document: dict[str, Any], number: int, things: Sequence[SceneObject]) -> None:
@@ -260,12 +254,13 @@ def _far_center(sheets: Sequence[Sheet]) -> Vectors | None:
     return center if np.linalg.norm(center) > _FAR * np.linalg.norm(high - low) else None
 
 
-def _named_once(materials: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+def _named_once(materials: Sequence[Any]) -> dict[str, int]:
     """Numbers of the materials that have a name of their own and use no texture coordinates but the first."""
     found: dict[str, list[int]] = {}
     for number, material in enumerate(materials):
-        if material.get("name") and not _has_other_coordinates(material):
-            found.setdefault(material["name"], []).append(number)
+        name = material.get("name") if isinstance(material, dict) else None
+        if isinstance(name, str) and not _has_other_coordinates(material):
+            found.setdefault(name, []).append(number)
     return {name: numbers[0] for name, numbers in found.items() if len(numbers) == 1}
 
 
@@ -281,7 +276,7 @@ def _drop_instancing(document: dict[str, Any]) -> None:
         return
     for key in ("extensionsUsed", "extensionsRequired"):
         if INSTANCING in document.get(key, []):
-            document[key].remove(INSTANCING)
+            document[key] = [name for name in document[key] if name != INSTANCING]
             if not document[key]:
                 del document[key]
 
