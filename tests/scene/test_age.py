@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,13 @@ from tests.scene.test_detail import looking
 from tests.scene.yards import box, yard
 from weathercoat.batch.job import Outcome
 from weathercoat.batch.processes import InlineExecutor
+from weathercoat.errors import Note
 from weathercoat.output.pictures import read_png
 from weathercoat.scene.age import age_scene
 from weathercoat.scene.graph import Rule, Scene
 from weathercoat.scene.plan import Choices, plan_scene
 from weathercoat.scene.read import read_scene
-from weathercoat.scene.report import make_report, table_lines
+from weathercoat.scene.report import make_report, note_lines, table_lines
 
 _QUICK = ["remesh.faces=300", "ageing.steps=60", "checkpoint.keep=false", "ageing.duration=3"]
 
@@ -138,6 +140,21 @@ def test_what_fails_stays_as_it_is(tmp_path: Path) -> None:
     back = read_scene(tmp_path / "scene.glb")
     roof = next(item for item in back.objects if item.name == "roof")
     assert len(back.meshes[roof.mesh].faces) == len(scene.meshes["cube"].faces)
+
+
+def test_repairs_are_told() -> None:
+    scene = shed()
+    mended = {
+        key: surface.with_notes(Note("W-FLIPPED", 3, "turned")) for key, surface in scene.meshes.items()
+    }
+    scene = replace(scene, meshes=mended, notes=(Note("W-OBJECT", 1, "passed over"),))
+    report = make_report(plan_scene(scene), "shed.yaml")
+    validate(report)
+    assert [note["mesh"] for note in report["notes"]] == [None, "cube", "sphere", "plate"]
+    assert list(note_lines(scene))[:2] == [
+        "yard: W-OBJECT(1): passed over",
+        "yard: cube: W-FLIPPED(3): turned",
+    ]
 
 
 def test_a_scene_with_nothing_to_do_is_written_as_it_is(tmp_path: Path) -> None:

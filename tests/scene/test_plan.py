@@ -127,3 +127,15 @@ def test_an_object_that_is_added_changes_no_other_plan() -> None:
     more = plans(yard(box("a", 0, 0.5), box("b", 9, 0.5), SceneObject("c", "sphere", at(0, 0.5, -500))))
     assert few["a"][0] == more["a"][0]
     assert few["b"][1]["ageing"]["duration"] == pytest.approx(more["b"][1]["ageing"]["duration"], abs=0.005)
+
+
+def test_a_size_in_pixels_stands_instead_of_the_camera() -> None:
+    scene = yard(box("a", scale=(2, 2, 2)), camera=looking((0, 0.5, 10)))
+    plan = plan_scene(scene, Choices(overrides=["scene.pixels_per_metre=50"]))
+    assert plan.shown["a"].plan.quality["scene"]["per_unit"] == pytest.approx(100.0)
+
+
+def test_rates_that_grow_out_of_bounds_are_refused() -> None:
+    scene = yard(_ROOF, box("a", 0, 0.5, 0), overrides={"dust.rate": 1e6})
+    with pytest.raises(ConfigError, match=r"dust\.rate"):
+        plan_scene(scene)

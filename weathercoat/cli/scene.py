@@ -100,15 +100,15 @@ def command(
     from weathercoat.scene.age import age_scene
     from weathercoat.scene.plan import Choices, plan_scene
     from weathercoat.scene.read import read_scene
-    from weathercoat.scene.report import table_lines
+    from weathercoat.scene.report import note_lines, table_lines
 
     out = output or Path(f"{scene.stem}-aged")
     choices = Choices(config, [*assignments, *options.shortcuts(quality=quality)], age, seed, variants)
     with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
         with report_compiling(messages.log):
             read = read_scene(scene)
-            for note in read.notes:
-                messages.log(f"{scene}: {note.line()}")
+            for line in note_lines(read):
+                messages.log(line)
             plan = plan_scene(read, choices)
         if dry_run:
             _say_plan(plan, scene.name, as_json=as_json)

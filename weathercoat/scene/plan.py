@@ -12,7 +12,7 @@ import numpy as np
 from weathercoat.config.load import LoadedConfig, Override, load_config
 from weathercoat.config.quality import AUTO
 from weathercoat.cost import Cost, estimate_cost
-from weathercoat.errors import WeathercoatError
+from weathercoat.errors import ConfigError, WeathercoatError
 from weathercoat.mesh.surface import Surface
 from weathercoat.plan import Plan, make_plan
 from weathercoat.run import split_paint
@@ -164,14 +164,20 @@ class _Configs:
         if self._choices.seed is not None:
             said.append(Override("seed", self._choices.seed, "--seed"))
         camera = self._scene.camera
-        first = []
+        first: list[Override] = []
         if camera is not None:
             first = [
                 Override("scene.nearest", 1.0, _CAMERA),
                 Override("scene.field_of_view", camera.field_of_view, _CAMERA),
                 Override("scene.image_height", camera.image_height, _CAMERA),
             ]
-        loaded = load_config(name, [*first, *said])
+        try:
+            loaded = load_config(name, [*first, *said])
+        except ConfigError as error:
+            if not first or all(problem.key != "scene.pixels_per_metre" for problem in error.problems):
+                raise
+            first = []  # a size in pixels that the config gives stands instead of the camera
+            loaded = load_config(name, said)
         if camera is not None and _is_left_open(loaded, "quality"):
             loaded = load_config(name, [Override("quality", AUTO, _CAMERA), *first, *said])
         values: dict[str, Any] = {}

@@ -5,14 +5,15 @@ Its form is that of `schemas/scene_report.json`. It holds no times, so the same 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from weathercoat.errors import Note, printable
 from weathercoat.output.report import versions
 from weathercoat.scene.detail import pixels_per_unit
 from weathercoat.scene.exposure import ground_level
-from weathercoat.scene.graph import SceneObject
+from weathercoat.scene.graph import Scene, SceneObject
 from weathercoat.scene.plan import ScenePlan, VariantPlan
 
 REPORT = "scene.json"
@@ -44,8 +45,25 @@ def make_report(plan: ScenePlan, source: str, batch: Mapping[str, Any] | None = 
         "variants": [
             _variant_row(variant, plan.assets, results.get(job_name(variant))) for variant in plan.variants
         ],
-        "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in scene.notes],
+        "notes": [
+            {"mesh": mesh, "code": note.code, "count": note.count, "message": note.message}
+            for mesh, notes in _notes(scene)
+            for note in notes
+        ],
     }
+
+
+def _notes(scene: Scene) -> Iterator[tuple[str | None, Sequence[Note]]]:
+    """The notes of the scene, and those of each mesh."""
+    yield None, scene.notes
+    yield from ((key, surface.notes) for key, surface in scene.meshes.items())
+
+
+def note_lines(scene: Scene) -> Iterator[str]:
+    """What could not be kept, and what was repaired, for people."""
+    for mesh, notes in _notes(scene):
+        for note in notes:
+            yield printable(f"{scene.name}: " + (f"{mesh}: " if mesh is not None else "")) + note.line()
 
 
 def job_name(variant: VariantPlan) -> str:

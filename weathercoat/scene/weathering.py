@@ -17,9 +17,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
+from weathercoat.config.wording import explain
+from weathercoat.errors import ConfigError, ConfigProblem
 from weathercoat.mesh.surface import Vectors
 from weathercoat.scene.exposure import CALM_SHARE, RAIN_SLOPE, Exposure
 
@@ -147,7 +150,10 @@ def weathered_config(
 
 
 def with_values(loaded: LoadedConfig, values: _Values, origin: str) -> LoadedConfig:
-    """A config with other values, by dotted keys; origin: where they come from."""
+    """A config with other values, by dotted keys; origin: where they come from.
+
+    Raises ConfigError for values out of bounds.
+    """
     content = loaded.config.as_dict()
     for key, value in values.items():
         section, _, name = key.partition(".")
@@ -155,8 +161,13 @@ def with_values(loaded: LoadedConfig, values: _Values, origin: str) -> LoadedCon
             content[section][name] = value
         else:
             content[section] = value
-    origins = {**loaded.origins, **dict.fromkeys(values, origin)}
-    return replace(loaded, config=Config.model_validate(content), origins=origins)
+    try:
+        config = Config.model_validate(content)
+    except ValidationError as error:
+        found = [explain(detail) for detail in error.errors(include_url=False)]
+        problems = (ConfigProblem(origin, 0, ".".join(path), what) for path, what in found)
+        raise ConfigError(problems=tuple(problems)) from None
+    return replace(loaded, config=config, origins={**loaded.origins, **dict.fromkeys(values, origin)})
 
 
 def _degree(wear: float) -> float:
