@@ -23,11 +23,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import NamedTemporaryFile, mkdtemp
+from threading import get_ident
 from typing import Any
 
 import numba
@@ -229,19 +230,22 @@ def remove_unused() -> int:
 
 @dataclass
 class Compiling(numba.core.event.Listener):  # type: ignore[misc]
-    """What was compiled: the number of kernels and the seconds that it took. `begun` is called before the
-    first, or before the first that another process is waited for.
+    """What its thread compiled: the number of kernels and the seconds that it took. `begun` is called before
+    the first, or before the first that another process is waited for.
     """
 
     begun: Callable[[], None]
     kernels: int = 0
     seconds: float = 0.0
+    _thread: int = field(default_factory=get_ident)
     _has_begun: bool = False
     _depth: int = 0
     _started: float = 0.0
 
     def on_start(self, event: numba.core.event.Event) -> None:
         """Kernels are compiled within the kernels that call them; the outermost one's time counts."""
+        if get_ident() != self._thread:
+            return
         if not self._has_begun:
             self._has_begun = True
             self.begun()
@@ -254,7 +258,7 @@ class Compiling(numba.core.event.Listener):  # type: ignore[misc]
 
     def on_end(self, event: numba.core.event.Event) -> None:
         """The end of what began last."""
-        if event.kind == _WAIT:
+        if event.kind == _WAIT or get_ident() != self._thread:
             return
         self._depth -= 1
         if self._depth == 0:

@@ -235,7 +235,7 @@ def test_a_worker_of_another_version_is_not_used(cluster: Cluster, tmp_path: Pat
     )
     cluster.start_worker(program=(str(other),))
     task = make_task(make_job(tmp_path, "a"), tmp_path / "out")
-    with pytest.raises(ClusterError, match=r"other versions: numpy 1\.0\.0, here ") as caught:
+    with pytest.raises(ClusterError, match=r"differs: numpy 1\.0\.0, here ") as caught:
         outcomes_of([task], cluster)
     assert caught.value.exit_code == 8
     cluster.start_worker()

@@ -36,7 +36,6 @@ from weathercoat.errors import (
     WorkerError,
     internal_error,
 )
-from weathercoat.output.report import versions
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -48,14 +47,16 @@ SECONDS_WITHOUT_WORKERS = 60.0
 _SECONDS_BETWEEN_LOOKS = 1.0
 _SECONDS_OF_A_CALL = 10.0
 _SECONDS_BETWEEN_PROGRESS = 0.5
+_SECONDS_BETWEEN_TRIES = 0.2
+_PROCESSOR = "processor"
 _SHARE_OF_MEMORY = 0.9  # a nanny ends its worker at 0.95
 
 
 class DaskExecutor:
     """Runs tasks on the workers of a Dask cluster, as many at a time as they have threads and memory for.
 
-    scheduler: its address, `tcp://10.0.0.1:8786`, or the path of the file that it was told to write. Workers
-    that join are used; those with another version of weathercoat or its libraries are not.
+    scheduler: its address, `tcp://10.0.0.1:8786`, or the path of the `.json` that it was told to write.
+    Workers that join are used; those with another version of weathercoat or its libraries are not.
     seconds_without_workers: how long workers are waited for where there are none.
     """
 
@@ -100,6 +101,7 @@ class _Worker:
     threads: int
     memory: float
     is_fit: bool | None = None
+    remark: str = ""
     is_open: bool = True
     running: dict[str, _Attempt] = field(default_factory=dict)
 
@@ -200,31 +202,35 @@ class _Dispatch:
         self._asked[key] = worker, self._submit(key, worker, _make_question())
 
     def _note_versions(self, worker: _Worker, answer: Future) -> None:
-        """Learn whether a worker can run tasks; what is wrong with it is told with the next outcome."""
+        """Learn whether a worker can run tasks; how it differs is told with the next outcome."""
         if answer.status not in ("finished", "error"):  # it was lost before it answered
             return
-        here = versions()
-        there: dict[str, str] | str
+        here = _make_question()()
         try:
             there = answer.result(timeout=_SECONDS_OF_A_CALL)
         except Exception as error:
-            there = f"{type(error).__name__}: {error}"
-        worker.is_fit = there == here
-        if isinstance(there, str):
-            self._remarks.append(f"worker {worker.address} has no weathercoat: {there}")
-        elif not worker.is_fit:
-            names = [name for name in here if there.get(name) != here[name]]
-            apart = ", ".join(f"{name} {there.get(name)}, here {here[name]}" for name in names)
-            self._remarks.append(f"worker {worker.address} has other versions: {apart}")
+            worker.is_fit = False
+            self._remark(worker, f"lacks weathercoat: {type(error).__name__}: {error}")
+            return
+        names = [name for name in sorted(here.keys() | there) if there.get(name) != here.get(name)]
+        worker.is_fit = names in ([], [_PROCESSOR])
+        if names:
+            apart = ", ".join(f"{name} {there.get(name)}, here {here.get(name)}" for name in names)
+            but = "; without --portable its results may differ in last bits" if worker.is_fit else ""
+            self._remark(worker, f"differs: {apart}{but}")
+
+    def _remark(self, worker: _Worker, what: str) -> None:
+        worker.remark = f"worker {worker.address} {what}"
+        self._remarks.append(worker.remark)
 
     def _require_workers(self) -> None:
         """Raise ClusterError where no worker can run tasks, or none has been there for too long."""
-        workers = self._workers.values()
+        workers = list(self._workers.values())
         if workers and all(worker.is_fit is False for worker in workers):
             raise ClusterError(
-                f"no worker can run the jobs: {self._remarks[0]}",
+                f"no worker can run the jobs: {workers[0].remark}",
                 file=self._scheduler,
-                remedy="install the same versions on the workers",
+                remedy="install the same versions there, and start the workers in the same environment",
             )
         if workers:
             self._workers_seen = time.monotonic()
@@ -361,21 +367,27 @@ def _connected(scheduler: str) -> Iterator[Client]:
 
 
 def _read_address(scheduler: str) -> str:
-    """The address of a scheduler, which may be given by the file that it has written."""
-    path = Path(scheduler)
-    if "://" in scheduler or not path.is_file():
+    """The address of a scheduler, which may be given by the file that it writes when it starts."""
+    if not scheduler.endswith(".json"):
         return scheduler
-    try:
-        return str(json.loads(path.read_bytes())["address"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise UsageError("is no file that a scheduler has written", file=scheduler) from None
+    until = time.monotonic() + SECONDS_TO_CONNECT
+    while True:
+        try:
+            return str(json.loads(Path(scheduler).read_bytes())["address"])
+        except (OSError, ValueError, KeyError, TypeError):
+            if time.monotonic() > until:
+                raise ClusterError("no scheduler has written this file", file=scheduler) from None
+        time.sleep(_SECONDS_BETWEEN_TRIES)
 
 
 def _from_anywhere(task: Task) -> Task:
     """The task with whole paths: workers have working directories of their own."""
     job = task.job
-    asset, target = (text if is_url(text) else os.path.abspath(text) for text in (job.asset, task.target))  # noqa: PTH100 (which follows no links)
-    return replace(task, job=replace(job, asset=asset), target=target)
+
+    def whole(text: str) -> str:
+        return text if is_url(text) else os.path.abspath(text)  # noqa: PTH100 (follows no links)
+
+    return replace(task, job=replace(job, asset=whole(job.asset)), target=whole(task.target))
 
 
 def _new_key(kind: str) -> str:
@@ -383,16 +395,19 @@ def _new_key(kind: str) -> str:
 
 
 def _make_question() -> Callable[[], dict[str, str]]:
-    """A function that tells a worker's versions; being local, it travels without this module, which the
-    worker may lack.
+    """A function that tells what the bytes of a worker's results hang on; being local, it travels without
+    this module, which the worker may lack.
     """
 
-    def tell_versions() -> dict[str, str]:
+    def tell() -> dict[str, str]:
+        from llvmlite.binding import get_host_cpu_name
+
         from weathercoat.output.report import versions
 
-        return versions()
+        found = versions()
+        return {**found, "processor": found.get("target") or get_host_cpu_name()}
 
-    return tell_versions
+    return tell
 
 
 class _Unwanted(BaseException):
