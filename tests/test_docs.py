@@ -128,7 +128,7 @@ def test_commands_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def make_wrapper(folder: Path) -> Path:
-    """A folder with a `weathercoat` for the shell, whose runs are quick."""
+    """A folder with a `weathercoat` for the shell, whose runs are quick, and a `dask`."""
     binaries = folder / "bin"
     binaries.mkdir()
     script = binaries / "weathercoat"
@@ -141,7 +141,16 @@ exec {shlex.quote(sys.executable)} -m weathercoat "$@"
 """,
         encoding="utf-8",
     )
-    script.chmod(0o755)
+    dask = binaries / "dask"
+    dask.write_text(
+        f"""#!/bin/bash
+export PYTHONPATH={shlex.quote(str(ROOT))}
+exec {shlex.quote(sys.executable)} -m dask "$@"
+""",
+        encoding="utf-8",
+    )
+    for program in (script, dask):
+        program.chmod(0o755)
     return binaries
 
 

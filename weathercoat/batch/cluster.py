@@ -93,7 +93,7 @@ class _Attempt:
 @dataclass
 class _Worker:
     """A process of the cluster. is_fit: whether it can run tasks, None as long as it has not answered;
-    is_open: whether it takes tasks now.
+    remark: how it differs; is_open: whether it takes tasks now.
     """
 
     address: str
