@@ -107,7 +107,7 @@ bench: .venv/bench-$(FINGERPRINT)
 	$(BIN)/python docs/make.py speed --results build/bench
 
 # Every benchmark that ends in charts of its own; each keeps its results in docs/ and fills its page.
-CHARTS := accuracy convergence stability independence fidelity scenes
+CHARTS := accuracy convergence stability independence noise fidelity scenes
 
 charts: .venv/bench-$(FINGERPRINT)
 	@mkdir -p build

@@ -14,6 +14,8 @@
     python docs/make.py stability --results FOLDER
     python docs/make.py independence --results FOLDER
                                             accuracy.md, stability.md and independence.md, likewise
+    python docs/make.py noise --results FOLDER
+                                            regression.md, and the spread that `compare` reads
     python docs/make.py fidelity --results FOLDER
     python docs/make.py scenes --results FOLDER
                                             fidelity.md, and the front that `quality` reads
@@ -33,6 +35,7 @@ from making import (
     fidelity,
     gallery,
     independence,
+    noise,
     pages,
     scenes,
     speed,
@@ -46,6 +49,7 @@ RESULTS = {
     "convergence": convergence.take_results,
     "stability": stability.take_results,
     "independence": independence.take_results,
+    "noise": noise.take_results,
     "fidelity": fidelity.take_fidelity,
     "scenes": fidelity.take_scenes,
 }

@@ -33,6 +33,7 @@ CODE_SPAN = re.compile(r"`[^`\n]+`")
 # What a run is given on top, so that it takes a moment; its snapshots keep their numbers, thinned out.
 QUICK = ("--faces", "300", "--set", "output.picture_width=24", "--set", "output.picture_height=16")
 QUICK_SCENE = ("--set", "remesh.faces=300", "--set", "ageing.steps=50", "--no-preview")
+QUICK_BASELINE = ("--faces", "300", "--steps", "50")
 SHELL_ONLY = ("make", "pip", "pipx", "mkdir")
 LARGEST_IMAGES = 12_000_000
 
@@ -73,6 +74,8 @@ def is_plain(command: str) -> bool:
 def quick(arguments: list[str]) -> list[str]:
     """The same call on a coarse mesh, with small pictures."""
     extra = {"run": QUICK, "scene": QUICK_SCENE}
+    if arguments[:2] == ["baseline", "record"]:
+        return [*arguments, *QUICK_BASELINE]
     return [*arguments, *extra.get(arguments[0], ())]
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator
 
 import weathercoat
-from making import accuracy, effects, fidelity, gallery, independence, speed, stability
+from making import accuracy, effects, fidelity, gallery, independence, noise, speed, stability
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
@@ -215,6 +215,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "accuracy.md": accuracy.accuracy_page,
     "stability.md": stability.stability_page,
     "independence.md": independence.independence_page,
+    "regression.md": noise.regression_page,
     "python.md": python_page,
     "../weathercoat/schemas/scene.json": scene_schema_file,
 }

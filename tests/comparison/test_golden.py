@@ -1,4 +1,4 @@
-"""This version against results that are kept, of a plate and a machine part; by noise, as bytes hang on the CPU.
+"""This version against kept results of a plate and a machine part; by noise, as bytes hang on the CPU.
 
 After a change of results that is meant, `make golden` records them anew.
 """

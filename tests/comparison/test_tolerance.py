@@ -43,6 +43,14 @@ pictures: 0.1
     assert tolerance.rule_of("raised") is None
 
 
+def test_the_example_of_the_docs_is_valid(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "regression.md").read_text(encoding="utf-8")
+    example = page.partition("## Tolerances")[2].partition("```yaml\n")[2].partition("```")[0]
+    tolerance = read_tolerance(_write(tmp_path, example))
+    assert {rule.pattern for rule in tolerance.rules} == {"flakes", "*_share"}
+    assert tolerance.pictures < math.inf
+
+
 def test_an_empty_file_is_the_default(tmp_path: Path) -> None:
     tolerance = read_tolerance(_write(tmp_path, "# nothing\n"))
     assert tolerance == Tolerance()

@@ -297,6 +297,58 @@ def scenes(
     _print(results, lambda found: as_lines(scenes_table(found)), output, quiet=quiet, as_json=as_json)
 
 
+@command.command("noise")
+@click.option("--faces", type=int, default=3000, show_default=True, metavar="N", help="Faces of each run.")
+@click.option("--steps", type=int, default=300, show_default=True, metavar="N", help="Steps of each run.")
+@click.option(
+    "--seeds", type=int, default=20, show_default=True, metavar="N",
+    help="Seeds of each part and config, for the spread.",
+)  # fmt: skip
+@click.option(
+    "--judged", type=int, default=40, show_default=True, metavar="N",
+    help="Further seeds, that groups to judge are drawn from.",
+)  # fmt: skip
+@click.option(
+    "--trials", type=int, default=1000, show_default=True, metavar="N", help="Judgements of each kind."
+)
+@options.output(
+    "Folder for noise.json, .csv and shipped.json, which comparisons read; without it nothing is written."
+)
+@options.overwrite
+@options.quiet
+@options.as_json
+@options.debug
+def noise(
+    faces: int,
+    steps: int,
+    seeds: int,
+    judged: int,
+    trials: int,
+    output: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """How far seeds are apart in each figure, and how well comparisons tell that from a change.
+
+    Four parts by four configs for the spread; then how often groups of runs of one kind are called different,
+    and how often such with another crack direction threshold. It takes about ten minutes.
+    """
+    from weathercoat.bench.noise import bench_noise, make_shipped
+    from weathercoat.bench.noise_tables import as_csv, as_text
+
+    folder = _results_folder("noise", output, overwrite=overwrite)
+    with Messages(quiet=quiet or as_json) as messages:
+        results = bench_noise(
+            faces=faces, steps=steps, seeds=seeds, judged=judged, trials=trials,
+            progress=messages.progress, say=messages.log,
+        )  # fmt: skip
+        if folder is not None:
+            shipped = {"shipped.json": make_shipped(results)}
+            _write(folder, "noise", results, as_csv(results), {}, messages.log, shipped)
+    _print(results, as_text, output, quiet=quiet, as_json=as_json)
+
+
 def _results_folder(name: str, output: Path | None, *, overwrite: bool) -> RunFolder | None:
     """The folder for a benchmark's results, refused before any work where it cannot be written."""
     from weathercoat.output.folder import RunFolder

@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.comparison.noise import LAWS, expected_spread
+from weathercoat.comparison.noise import LAWS, expected_spread, expected_spread_of_mean
 from weathercoat.comparison.statistics import RunFigures
 from weathercoat.comparison.tolerance import Rule, Tolerance
 from weathercoat.errors import UsageError
@@ -274,13 +274,17 @@ def _test_by_figures(
 ) -> _Test:
     """The figure whose mean over the ages is farthest from that of the other group."""
     units = np.where(spreads > 0.0, spreads, np.inf)
-    scores, deviation = (table.values / units).mean(axis=2), np.ones(len(table.figures))
+    scores = (table.values / units).mean(axis=2)
+    deviation = np.array([expected_spread_of_mean(figure) for figure in table.figures])
     if not math.isinf(freedom):
         own = _scores(table)
         a, b = own[: table.first], own[table.first :]
         squares = ((a - a.mean(axis=0)) ** 2).sum(axis=0) + ((b - b.mean(axis=0)) ** 2).sum(axis=0)
         varies = squares > ROUND_OFF  # in units of the spread over all runs
-        scores, deviation = np.where(varies, own, scores), np.where(varies, np.sqrt(squares / freedom), 1.0)
+        scores, deviation = (
+            np.where(varies, own, scores),
+            np.where(varies, np.sqrt(squares / freedom), deviation),
+        )
     a, b = scores[: table.first], scores[table.first :]
     distance = np.abs(b.mean(axis=0) - a.mean(axis=0)) / (deviation * math.sqrt(1 / len(a) + 1 / len(b)))
     distance = np.where(free, distance, 0.0)

@@ -57,7 +57,7 @@ LAWS: Mapping[str, Law] = {
     "raised": _RELATIVE_MEAN,
 }
 _LEAST_LENGTH = 0.1  # sizes: shorter cracks are a few edges
-_FILE = Path(__file__).with_name("noise.json")
+SHIPPED = Path(__file__).with_name("noise.json")
 
 
 def unit_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
@@ -71,12 +71,21 @@ def unit_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
 
 
 def expected_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
-    """The standard deviation between seeds to be expected of a figure; see `unit_spread`."""
-    return coefficients()[figure] * unit_spread(figure, values, length)
+    """The standard deviation between seeds to be expected of a figure at each of several ages; see
+    `unit_spread`.
+    """
+    return _shipped()[figure]["at_an_age"] * unit_spread(figure, values, length)
+
+
+def expected_spread_of_mean(figure: str) -> float:
+    """The standard deviation to be expected of a figure's mean over the ages, each in units of
+    `expected_spread`: the less, the less its ages have to do with each other.
+    """
+    return _shipped()[figure]["of_the_mean"] / _shipped()[figure]["at_an_age"]
 
 
 @cache
-def coefficients() -> Mapping[str, float]:
-    """The measured coefficient of each figure, below which 9 in 10 cases lie."""
-    content: Mapping[str, float] = json.loads(_FILE.read_bytes())["coefficients"]
+def _shipped() -> Mapping[str, Mapping[str, float]]:
+    """The measured coefficients of each figure, below which 9 in 10 cases lie."""
+    content: Mapping[str, Mapping[str, float]] = json.loads(SHIPPED.read_bytes())["figures"]
     return content
