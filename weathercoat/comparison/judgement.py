@@ -83,7 +83,7 @@ def judge(a: Sequence[RunFigures], b: Sequence[RunFigures], tolerance: Tolerance
     tolerance = tolerance or Tolerance()
     table = _align(a, b, tolerance)
     if _are_same(table):
-        return Judgement("same", tuple(_rows_of_equals(table)), "every figure is equal, but for round-off")
+        return Judgement("same", tuple(_rows_of_equals(table)), "Every figure is equal, but for round-off.")
     spreads, freedom, source = _spreads(table)
     rules = [tolerance.rule_of(figure) for figure in table.figures]
     free = np.array([rule is None for rule in rules])
@@ -93,8 +93,8 @@ def judge(a: Sequence[RunFigures], b: Sequence[RunFigures], tolerance: Tolerance
     ruled = [row.is_beyond for row in rows if tolerance.rule_of(row.figure)]
     method = test.method
     if ruled:
-        by_rules = f"{sum(ruled)} of {len(ruled)} values by the tolerance's rules are beyond them"
-        method = f"{method}; {by_rules}" if free.any() else by_rules
+        by_rules = f"Of {len(ruled)} values with rules of the tolerance, {sum(ruled)} are beyond them."
+        method = f"{method} {by_rules}".strip()
     is_different = test.is_different or any(ruled)
     return Judgement("different" if is_different else "within noise", tuple(rows), method)
 
@@ -236,10 +236,8 @@ def _test_by_permutation(scores: NDArray[np.float64], first: int, splits: int, l
     between = (groups @ scores) ** 2 * (runs / (first * (runs - first)))
     statistic = (between / (1.0 - np.minimum(between, 1.0) + _LEAST_WITHIN)).sum(axis=1)
     p = float(np.mean(statistic >= statistic[0] * (1.0 - ROUND_OFF)))
-    kind = "exact permutation test" if splits <= MOST_SPLITS else "permutation test"
-    method = (
-        f"{kind} over {len(groups):,} splits of {first} and {runs - first} runs: p = {p:.2g}, level {level:g}"
-    )
+    kind = "Exact permutation test" if splits <= MOST_SPLITS else "Permutation test"
+    method = f"{kind} over {len(groups):,} splits of {first} and {runs - first} runs: p = {p:.2g}, level {level:g}."
     return _Test(p <= level, method)
 
 
@@ -297,7 +295,7 @@ def _test_by_figures(
     )
     method = (
         f"{int(free.sum())} figures by {source}, {kind}: {table.figures[worst]} is farthest apart,"
-        f" {distance[worst]:.1f} standard deviations where {limit:.1f} are allowed at level {level:g}"
+        f" {distance[worst]:.1f} standard deviations where {limit:.1f} are allowed at level {level:g}."
     )
     return _Test(bool(distance[worst] > limit), method)
 
