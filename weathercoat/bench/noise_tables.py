@@ -8,6 +8,7 @@ from typing import Any
 from weathercoat.bench.files import rows_as_csv
 from weathercoat.bench.noise import THRESHOLDS
 from weathercoat.bench.tables import Table, as_lines, describe_lines, digits
+from weathercoat.comparison.statistics import FIGURES
 
 
 def spread_table(results: dict[str, Any], parts: tuple[str, ...] = ("plate", "bracket")) -> Table:
@@ -19,7 +20,8 @@ def spread_table(results: dict[str, Any], parts: tuple[str, ...] = ("plate", "br
         if case["part"] == part and case["config"] == "standard"
     ]  # fmt: skip
     rows = [["figure", *parts, "at one age", "mean over ages"]]
-    for figure, shipped in results["figures"].items():
+    for figure in FIGURES:
+        shipped = results["figures"][figure]
         ends = [case["figures"][figure] for case in cases]
         cells = [f"{digits(end['mean'][-1])} ± {digits(end['spread'][-1])}" for end in ends]
         rows.append([figure, *cells, digits(shipped["at_an_age"]), digits(shipped["of_the_mean"])])

@@ -237,7 +237,8 @@ def _test_by_permutation(scores: NDArray[np.float64], first: int, splits: int, l
     statistic = (between / (1.0 - np.minimum(between, 1.0) + _LEAST_WITHIN)).sum(axis=1)
     p = float(np.mean(statistic >= statistic[0] * (1.0 - ROUND_OFF)))
     kind = "Exact permutation test" if splits <= MOST_SPLITS else "Permutation test"
-    method = f"{kind} over {len(groups):,} splits of {first} and {runs - first} runs: p = {p:.2g}, level {level:g}."
+    groups_of = f"{first} and {runs - first} runs"
+    method = f"{kind} over {len(groups):,} splits of {groups_of}: p = {p:.2g}, level {level:g}."
     return _Test(p <= level, method)
 
 
