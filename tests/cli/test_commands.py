@@ -298,6 +298,24 @@ def test_sample_writes_a_scene_and_its_rules(capsys: pytest.CaptureFixture[str])
     assert call(["sample", "yard", "-o", "y.glb"]) == 7
 
 
+def test_inspect_of_several_goes_on_after_one_that_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("plate", "bracket"):
+        assert call(["sample", name]) == 0
+    Path("broken.obj").write_text("no model")
+    capsys.readouterr()
+    models = ["plate.obj", "broken.obj", "bracket.obj"]
+    assert call(["inspect", *models, "--json"]) == 8
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["file"] for row in told] == models
+    assert [row.get("name") for row in told] == ["plate", None, "bracket"]
+    assert told[1]["error"]["code"] == "E-FORMAT"
+    assert call(["inspect", *models]) == 8
+    words, errors = capsys.readouterr()
+    assert [line for line in words.splitlines() if line in models] == ["plate.obj", "bracket.obj"]
+    assert "broken.obj: E-FORMAT" in errors and "1 of 3 models could not be inspected" in errors
+    assert call(["inspect", "plate.obj", "bracket.obj"]) == 0
+
+
 def test_inspect_in_words_names_repairs_and_cost(capsys: pytest.CaptureFixture[str]) -> None:
     Path("t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 2\n")
     assert call(["inspect", "t.obj", "--self-intersections"]) == 0
