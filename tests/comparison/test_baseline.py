@@ -9,12 +9,14 @@ import pytest
 
 from weathercoat.batch.processes import InlineExecutor
 from weathercoat.cli.handler import call
-from weathercoat.comparison.baseline import BASELINE, Baseline, is_baseline, read_baseline
+from weathercoat.comparison.baseline import BASELINE, Baseline, is_baseline, pair_with_baseline, read_baseline
 from weathercoat.comparison.golden import check_baseline, record_baseline
 from weathercoat.comparison.judgement import judge
+from weathercoat.config.load import load_config
 from weathercoat.errors import AccessError, BatchError, CorruptError, OutputExistsError, UsageError
 from weathercoat.mesh.shapes import make_random_sheet
 from weathercoat.output.meshes import write_mesh
+from weathercoat.run import run_asset
 
 SMALL = ("remesh=off", "ageing.steps=30", "snapshots.count=2")
 SEEDS = 4
@@ -94,6 +96,29 @@ def test_a_small_change_has_other_bytes_and_a_large_one_other_figures(golden: Pa
     checks = check_baseline(baseline, golden, InlineExecutor(), assignments=["dust.rate=2"])
     assert [check.judgement.verdict for check in checks] == ["different", "different"]
     assert {row.figure for row in checks[0].judgement.differences if row.is_beyond} >= {"dust"}
+
+
+def test_runs_are_held_against_the_model_that_they_are_of(golden: Path, tmp_path: Path) -> None:
+    models = golden.parent / "models"
+    for name, seed in (("a", 1), ("b", 2), ("a", 3)):
+        loaded = load_config("standard", [*SMALL, "output.preview=false", f"seed={seed}"])
+        run_asset(loaded, models / f"{name}.obj", tmp_path / f"{name}{seed}")
+    pairs = pair_with_baseline(tmp_path, golden)
+    assert {name: [len(side) for side in sides] for name, sides in pairs.items()} == {
+        "a": [2, 4],
+        "b": [1, 4],
+    }
+    assert judge(*pairs["a"]).verdict == judge(*pairs["b"]).verdict == "same"
+    alone = pair_with_baseline(golden, tmp_path / "b2")
+    assert list(alone) == ["b"]
+    assert [len(side) for side in alone["b"]] == [4, 1]
+    both = pair_with_baseline(golden, golden / BASELINE)
+    assert [judge(*sides).verdict for sides in both.values()] == ["same", "same"]
+    with pytest.raises(AccessError, match=r"no run\.json"):
+        pair_with_baseline(models, golden)
+    run_asset(loaded, _sheet(tmp_path / "c.obj", 60), tmp_path / "c")
+    with pytest.raises(UsageError, match=r"a run of c.obj, and the baseline has a, b"):
+        pair_with_baseline(tmp_path / "c", golden)
 
 
 def test_a_config_file_and_the_last_snapshots_are_kept(tmp_path: Path) -> None:

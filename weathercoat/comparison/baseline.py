@@ -16,8 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from weathercoat.comparison.statistics import RunFigures
-from weathercoat.errors import AccessError, CorruptError
+from weathercoat.batch.names import PARTIAL
+from weathercoat.comparison.statistics import RunFigures, measure_run, read_report
+from weathercoat.errors import AccessError, CorruptError, UsageError
+from weathercoat.output.folder import REPORT
 from weathercoat.output.report import SIGNIFICANT_DIGITS, versions
 
 BASELINE = "baseline.json"
@@ -126,6 +128,49 @@ def read_baseline(path: Path | str) -> Baseline:
     if not baseline.models or not all(model.runs for model in baseline.models):
         raise CorruptError("holds no runs", file=str(file), remedy=_AGAIN)
     return baseline
+
+
+def pair_with_baseline(
+    a: Path | str, b: Path | str
+) -> dict[str, tuple[tuple[RunFigures, ...], tuple[RunFigures, ...]]]:
+    """The runs of two sides, of which one at least is a baseline, by the models of that one.
+
+    The other is a baseline too, the folder of a run, or one with several of them at any depth. Raises
+    UsageError for runs of models that the baseline does not hold, AccessError where there are none, and what
+    `measure_run` raises.
+    """
+    is_second = is_baseline(b)
+    golden, other = (read_baseline(b), a) if is_second else (read_baseline(a), b)
+    found: dict[str, list[RunFigures]] = {}
+    for name, inputs, figures in _runs_in(other):
+        model = golden.model_of(inputs)
+        if model is None:
+            known = ", ".join(model.name for model in golden.models)
+            what = f"{name} is a run of {', '.join(inputs)}, and the baseline has {known}"
+            raise UsageError(what, remedy="compare runs of the same models")
+        found.setdefault(model.name, []).append(figures)
+    pairs = {
+        model.name: (tuple(found[model.name]), model.figures)
+        for model in golden.models
+        if model.name in found
+    }
+    return pairs if is_second else {name: (theirs, ours) for name, (ours, theirs) in pairs.items()}
+
+
+def _runs_in(path: Path | str) -> Iterator[tuple[str, dict[str, str], RunFigures]]:
+    """Each run of a side: its name, SHA-256 of its inputs by file name, and its figures."""
+    if is_baseline(path):
+        for model in read_baseline(path).models:
+            yield from ((run.figures.name, dict(model.inputs), run.figures) for run in model.runs)
+        return
+    folder = Path(path)
+    folders = sorted(file.parent for file in folder.rglob(REPORT) if not file.parent.name.endswith(PARTIAL))
+    if not folders:
+        reason = f"there is no {REPORT} in it or in its folders"
+        raise AccessError(reason, file=str(path), remedy="give the folder of a finished run, or of several")
+    for run in folders:
+        inputs = {name: str(entry["sha256"]) for name, entry in read_report(run)["inputs"].items()}
+        yield run.name, inputs, measure_run(run)
 
 
 def describe_kind() -> dict[str, str]:
