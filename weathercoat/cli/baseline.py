@@ -44,6 +44,7 @@ def command() -> None:
 @click.option("--snapshots", "keep_snapshots", is_flag=True, help="Keep the last snapshot of each run too.")
 @options.overwrite
 @options.quiet
+@options.as_json
 @options.debug
 def record(
     out: Path,
@@ -59,6 +60,7 @@ def record(
     keep_snapshots: bool,
     overwrite: bool,
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Age each MODEL with several seeds, and keep what the runs came to in the folder OUT.
 
@@ -74,7 +76,7 @@ def record(
     from weathercoat.comparison.golden import record_baseline
 
     shortcuts = options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)
-    with Messages(quiet=quiet) as messages:
+    with Messages(quiet=quiet or as_json) as messages:
         teller, executor = _teller_and_executor(messages, workers)
         record_baseline(
             out,
@@ -88,7 +90,9 @@ def record(
             begin=teller.begin,
             listen=teller,
         )
-    if not quiet:
+    if as_json:
+        click.echo(json.dumps({"written": str(out / BASELINE)}, ensure_ascii=False))
+    elif not quiet:
         size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
         click.echo(f"{len(models)} models with {seeds} seeds each: {size / 1000:,.0f} kB")
         click.echo(f"written to {out / BASELINE}")

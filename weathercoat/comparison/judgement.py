@@ -258,7 +258,7 @@ def _all_splits(runs: int, first: int) -> NDArray[np.float64]:
 
 def _some_splits(runs: int, first: int) -> NDArray[np.float64]:
     """The actual split, and others by chance, the same each time."""
-    order = np.random.Generator(np.random.Philox(runs)).random((MOST_SPLITS, runs)).argsort(axis=1)
+    order = np.random.Generator(np.random.PCG64(runs)).random((MOST_SPLITS, runs)).argsort(axis=1)
     order[0] = np.arange(runs)
     return np.asarray(order < first, np.float64)
 
