@@ -56,7 +56,7 @@ def test_one_run_that_is_far_off_is_different() -> None:
 def test_five_against_five_is_an_exact_test() -> None:
     judgement = judge(make_group(1, 5), make_group(11, 5))
     assert judgement.verdict == "within noise"
-    assert "Exact permutation test over 126 splits" in judgement.method
+    assert "exact permutation test over 126 splits" in judgement.method
     judgement = judge(make_group(1, 5), make_group(11, 5, straightness=0.3))
     assert judgement.verdict == "different"
     assert "p = 0.0079" in judgement.method
@@ -67,7 +67,7 @@ def test_five_against_five_is_an_exact_test() -> None:
 
 def test_many_runs_are_split_by_chance_and_always_the_same() -> None:
     one = judge(make_group(1, 12), make_group(21, 12))
-    assert "Permutation test over 20,000 splits" in one.method
+    assert "permutation test over 20,000 splits" in one.method
     assert one == judge(make_group(1, 12), make_group(21, 12))
     assert judge(make_group(1, 12), make_group(21, 12, raised=0.2)).verdict == "different"
 

@@ -173,7 +173,7 @@ def _teller_and_executor(messages: Any, workers: int | None) -> tuple[Any, Execu
 def _lines(check: Check) -> Iterator[str]:
     """What a person reads about one model."""
     state = "passes" if check.is_passed else "fails"
-    yield f"{check.name}: {state}: {check.judgement.verdict}. {check.judgement.method}"
+    yield f"{check.name}: {state}: {check.judgement.verdict}: {check.judgement.method}"
     yield from (f"  {note}" for note in check.notes)
     for run, files in check.differing.items():
         more = f" and {len(files) - _MOST_FILES} more" if len(files) > _MOST_FILES else ""

@@ -65,7 +65,9 @@ class Difference:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict on two groups of runs, every figure that was compared, and in a sentence how they were."""
+    """The verdict on two groups of runs, every figure that was compared, and how they were judged: a sentence
+    that begins small and ends without a stop, to be put after the verdict.
+    """
 
     verdict: Verdict
     differences: tuple[Difference, ...]
@@ -83,7 +85,7 @@ def judge(a: Sequence[RunFigures], b: Sequence[RunFigures], tolerance: Tolerance
     tolerance = tolerance or Tolerance()
     table = _align(a, b, tolerance)
     if _are_same(table):
-        return Judgement("same", tuple(_rows_of_equals(table)), "Every figure is equal, but for round-off.")
+        return Judgement("same", tuple(_rows_of_equals(table)), "every figure is equal, but for round-off")
     spreads, freedom, source = _spreads(table)
     rules = [tolerance.rule_of(figure) for figure in table.figures]
     free = np.array([rule is None for rule in rules])
@@ -93,8 +95,8 @@ def judge(a: Sequence[RunFigures], b: Sequence[RunFigures], tolerance: Tolerance
     ruled = [row.is_beyond for row in rows if tolerance.rule_of(row.figure)]
     method = test.method
     if ruled:
-        by_rules = f"Of {len(ruled)} values with rules of the tolerance, {sum(ruled)} are beyond them."
-        method = f"{method} {by_rules}".strip()
+        by_rules = f"of {len(ruled)} values with rules of the tolerance, {sum(ruled)} are beyond them"
+        method = f"{method}; {by_rules}" if method else by_rules
     is_different = test.is_different or any(ruled)
     return Judgement("different" if is_different else "within noise", tuple(rows), method)
 
@@ -236,9 +238,9 @@ def _test_by_permutation(scores: NDArray[np.float64], first: int, splits: int, l
     between = (groups @ scores) ** 2 * (runs / (first * (runs - first)))
     statistic = (between / (1.0 - np.minimum(between, 1.0) + _LEAST_WITHIN)).sum(axis=1)
     p = float(np.mean(statistic >= statistic[0] * (1.0 - ROUND_OFF)))
-    kind = "Exact permutation test" if splits <= MOST_SPLITS else "Permutation test"
+    kind = "exact permutation test" if splits <= MOST_SPLITS else "permutation test"
     groups_of = f"{first} and {runs - first} runs"
-    method = f"{kind} over {len(groups):,} splits of {groups_of}: p = {p:.2g}, level {level:g}."
+    method = f"{kind} over {len(groups):,} splits of {groups_of}: p = {p:.2g}, level {level:g}"
     return _Test(p <= level, method)
 
 
@@ -296,7 +298,7 @@ def _test_by_figures(
     )
     method = (
         f"{int(free.sum())} figures by {source}, {kind}: {table.figures[worst]} is farthest apart,"
-        f" {distance[worst]:.1f} standard deviations where {limit:.1f} are allowed at level {level:g}."
+        f" {distance[worst]:.1f} standard deviations where {limit:.1f} are allowed at level {level:g}"
     )
     return _Test(bool(distance[worst] > limit), method)
 
