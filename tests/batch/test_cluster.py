@@ -16,6 +16,7 @@ from threading import Thread, Timer
 
 import pytest
 
+import weathercoat
 from tests.batch.jobs import make_broken_job, make_job, make_task, result_bytes
 from weathercoat.batch.cluster import DaskExecutor
 from weathercoat.batch.job import Job, Outcome, Task
@@ -82,8 +83,8 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 def slow_job(folder: Path, name: str, *overrides: str) -> Job:
-    """A job of some seconds, with a checkpoint every ten steps."""
-    return make_job(folder, name, "ageing.steps=1200", "checkpoint.steps=10", *overrides, faces=2000)
+    """A job of a second or more, with a checkpoint every 50 steps."""
+    return make_job(folder, name, "ageing.steps=2000", "checkpoint.steps=50", *overrides, faces=2000)
 
 
 def outcomes_of(tasks: list[Task], cluster: Cluster) -> dict[str, Outcome]:
@@ -100,6 +101,7 @@ def expected_bytes(task: Task, folder: Path) -> dict[str, bytes]:
 
 def test_a_worker_is_killed_and_the_bytes_are_those_of_this_process(cluster: Cluster, tmp_path: Path) -> None:
     workers = [cluster.start_worker(), cluster.start_worker()]
+    cluster.wait_for_workers(2)
     jobs = [slow_job(tmp_path, name, f"seed={seed}") for seed, name in enumerate("abc")]
     tasks = [make_task(job, tmp_path / "out") for job in (*jobs, make_broken_job(tmp_path, "none"))]
     on_the_way: set[str] = set()
@@ -107,7 +109,8 @@ def test_a_worker_is_killed_and_the_bytes_are_those_of_this_process(cluster: Clu
     for event in DaskExecutor(cluster.address).run(tasks):
         if isinstance(event, Outcome):
             outcomes[event.name] = event
-        elif event.done > 20:
+            on_the_way.discard(event.name)
+        elif event.done > 100:
             assert (tmp_path / "out" / f"{event.name}.partial" / CHECKPOINT_STATE).exists()
             on_the_way.add(event.name)
             if len(on_the_way) == 2 and workers[0].poll() is None:
@@ -122,6 +125,27 @@ def test_a_worker_is_killed_and_the_bytes_are_those_of_this_process(cluster: Clu
     assert any("going on from step" in line for line in again.messages)
     for task in tasks[:3]:
         assert result_bytes(Path(task.target)) == expected_bytes(task, tmp_path / "here")
+
+
+def test_the_command_takes_relative_paths(cluster: Cluster, tmp_path: Path) -> None:
+    """Workers have other working directories."""
+    cluster.start_worker()
+    task = make_task(make_job(tmp_path, "sheet_100"), tmp_path / "out")
+    config = tmp_path / "small.yaml"
+    config.write_text(
+        "remesh: off\nsnapshots: {count: 2}\noutput: {preview: false}\nageing: {steps: 30}\n",
+        encoding="utf-8",
+    )
+    command = ["batch", "sheet_100.obj", "-c", config.name, "-o", "out", "--executor", "dask"]
+    done = subprocess.run(
+        [sys.executable, "-m", "weathercoat", *command, "--scheduler", "cluster/scheduler.json"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(weathercoat.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert result_bytes(Path(task.target)) == expected_bytes(task, tmp_path / "here")
 
 
 def test_two_tasks_at_once_in_one_process_give_the_same_bytes(cluster: Cluster, tmp_path: Path) -> None:
@@ -283,6 +307,7 @@ def test_a_worker_that_comes_back_does_no_harm(tmp_path: Path, monkeypatch: pyte
     cluster = Cluster(folder)
     try:
         workers = [cluster.start_worker(), cluster.start_worker()]
+        cluster.wait_for_workers(2)
         tasks = [make_task(slow_job(tmp_path, name), tmp_path / "out") for name in "ab"]
         on_the_way: set[str] = set()
         outcomes = {}
