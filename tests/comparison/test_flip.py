@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from weathercoat.bench.flip import flip_map, mean_flip
+from weathercoat.comparison.flip import flip_map, mean_flip
 
 ROW, COLUMN = np.mgrid[0:60, 0:80]
 

@@ -8,7 +8,7 @@ from statistics import fmean
 import numpy as np
 
 from weathercoat.bench.fidelity_run import View
-from weathercoat.bench.flip import mean_flip
+from weathercoat.comparison.flip import mean_flip
 from weathercoat.mesh.closest import find_closest, make_closest_tree
 from weathercoat.mesh.projection import barycentric_of
 from weathercoat.mesh.surface import Vectors, face_areas

@@ -95,8 +95,8 @@ def _lines(comparison: Comparison) -> Iterator[str]:
 
 def _findings(side: Side) -> Iterator[str]:
     lines = [
-        f"{side.path / name if len(side.runs) > 1 else side.path}/{finding}"
-        for name, findings in side.findings.items()
+        f"{side.path}/{prefix}{finding}"
+        for prefix, findings in side.findings_by_prefix()
         for finding in findings
     ]
     yield from lines[:_MOST_FINDINGS]

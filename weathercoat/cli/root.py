@@ -25,6 +25,7 @@ SUBCOMMANDS = (
     "remesh",
     "render",
     "verify",
+    "compare",
     "schema",
     "warmup",
     "bench",

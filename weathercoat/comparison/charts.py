@@ -9,6 +9,7 @@ Line = Sequence[tuple[float, float]]
 """Points (age, value) in the order of their ages."""
 
 WIDTH, HEIGHT = 260, 132
+_MOST_BAND = 1.4  # of the largest value
 _LEFT, _RIGHT, _TOP, _BOTTOM = 40, 8, 8, 20
 
 
@@ -21,11 +22,13 @@ def draw_chart(
     """
     points = [point for line in (*a, *b) for point in line]
     ages = [age for age, _ in points] or [0.0]
-    values = [value for _, value in points] + [edge for _, *edges in band for edge in edges] or [0.0]
+    values = [value for _, value in points] or [0.0]
     first, last = min(ages), max(ages)
     # A band may reach below zero, where no figure of this kind can be.
-    low = min(0.0, min((value for _, value in points), default=0.0))
-    high = max(max(values), low + 1e-12)
+    low = min(0.0, *values)
+    # A band that is far wider than what was found would make lines of it flat.
+    widest = max((top for *_, top in band), default=0.0)
+    high = max(max(values), min(widest, _MOST_BAND * max(values)), low + 1e-12)
 
     def x(age: float) -> float:
         share = 0.5 if last == first else (age - first) / (last - first)
@@ -42,16 +45,11 @@ def draw_chart(
         f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(label)} over age">'
     ]
     for value in (low, (low + high) / 2.0, high):
-        parts.append(
-            f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{y(value):.1f}" y2="{y(value):.1f}"/>'
-        )
-        parts.append(
-            f'<text class="tick" x="{_LEFT - 5}" y="{y(value) + 3:.1f}" text-anchor="end">{short(value)}</text>'
-        )
+        at = f"{y(value):.1f}"
+        parts.append(f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{at}" y2="{at}"/>')
+        parts.append(_tick(_LEFT - 5, y(value) + 3.0, "end", short(value)))
     for age, anchor in ((first, "start"), (last, "end")):
-        parts.append(
-            f'<text class="tick" x="{x(age):.1f}" y="{HEIGHT - 5}" text-anchor="{anchor}">{age:.3g}</text>'
-        )
+        parts.append(_tick(x(age), HEIGHT - 5, anchor, f"{age:.3g}"))
     if band:
         edges = [(age, top) for age, _, top in band] + [(age, bottom) for age, bottom, _ in reversed(band)]
         parts.append(f'<polygon class="band" points="{path(edges)}"/>')
@@ -66,6 +64,10 @@ def draw_chart(
             for age, value in mean
         ]
     return "".join([*parts, "</svg>"])
+
+
+def _tick(x: float, y: float, anchor: str, text: str) -> str:
+    return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{text}</text>'
 
 
 def mean_line(lines: Sequence[Line]) -> list[tuple[float, float]]:

@@ -69,6 +69,11 @@ class Side:
     runs: tuple[Run, ...]
     findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
 
+    def findings_by_prefix(self) -> Iterator[tuple[str, tuple[Finding, ...]]]:
+        """The findings of each run, and what is before the names of its files in what was given."""
+        for name, findings in self.findings.items():
+            yield (f"{name}/" if len(self.runs) > 1 else ""), findings
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -108,12 +113,12 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
     sides = Side(Path(a), find_runs(a)), Side(Path(b), find_runs(b))
     runs = sides[0].runs, sides[1].runs
     if are_identical(*runs):
-        return Comparison("same", "Every file of both sides has the same bytes.", *sides, tolerance, {})
+        return Comparison("same", "every file of both sides has the same bytes", *sides, tolerance, {})
     configs = config_differences(*runs)
     sides = _verified(sides[0]), _verified(sides[1])
     count = sum(len(found) for side in sides for found in side.findings.values())
     if count:
-        method = f"Verification finds {count:,} fault{'s' * (count > 1)}; nothing else was compared."
+        method = f"verification finds {count:,} fault{'s' * (count > 1)}, and nothing else was compared"
         return Comparison("corrupt", method, *sides, tolerance, configs)
     is_single = len(runs[0]) == len(runs[1]) == 1
     groups = tuple(
@@ -125,7 +130,7 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
     method = worst.judgement.method
     if beyond:
         verdict = "different"
-        method += f" Beyond the tolerance: {'; '.join(beyond)}."
+        method += f"; beyond the tolerance: {'; '.join(beyond)}"
     return Comparison(verdict, method, *sides, tolerance, configs, groups, beyond)
 
 
@@ -143,9 +148,9 @@ def _verdict(group: Group) -> Verdict:
 def _compare_group(
     title: str, a: Sequence[Run], b: Sequence[Run], tolerance: Tolerance, every_picture: bool
 ) -> Group:
-    figures = [tuple(measure_run(run.folder) for run in runs) for runs in (a, b)]
+    first, second = (tuple(measure_run(run.folder) for run in runs) for runs in (a, b))
     pairs = tuple(_compare_pair(*pair, every_picture) for pair in _by_seed(a, b))
-    return Group(title, *figures, judge(*figures, tolerance), pairs)
+    return Group(title, first, second, judge(first, second, tolerance), pairs)
 
 
 def _by_seed(a: Sequence[Run], b: Sequence[Run]) -> list[tuple[Run, Run]]:

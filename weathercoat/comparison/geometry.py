@@ -119,10 +119,9 @@ def _are_whole(
     snapshot: Snapshot, half_edge: NDArray[np.int64], twin: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Whether there is film on both sides of each edge, and it hangs together."""
-    start = np.full((len(snapshot.substrate_faces), 3), -1, np.int64)
-    start[snapshot.film_face] = snapshot.film_faces
-    end = np.roll(start, -1, axis=1).ravel()
-    start = start.ravel()
+    corner = np.full((len(snapshot.substrate_faces), 3), -1, np.int64)
+    corner[snapshot.film_face] = snapshot.film_faces
+    start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     is_joined = (start[half_edge] == end[twin]) & (end[half_edge] == start[twin])
     return is_joined & (start[half_edge] >= 0)  # type: ignore[no-any-return]
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from weathercoat.comparison.flip import flip_map
 from weathercoat.comparison.sides import Run

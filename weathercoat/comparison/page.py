@@ -23,6 +23,7 @@ PAGE, RECORD = "compare.html", "compare.json"
 _STYLE = Path(__file__).with_name("page.css")
 _MOST_PAIRS = 12  # with pictures on the page: those that look most different
 _MOST_NAMES = 12
+_MINUS = "\N{MINUS SIGN}"
 # The first pictures to slide over are those of the last age; those of another come with a click.
 _SCRIPT = """
 for (const stage of document.querySelectorAll(".stage")) {
@@ -31,7 +32,10 @@ for (const stage of document.querySelectorAll(".stage")) {
     image.src = row.querySelectorAll("img")[i].src;
   });
   stage.querySelector("input").oninput = event => stage.style.setProperty("--at", event.target.value + "%");
-  rows.forEach(row => row.onclick = () => { show(row); stage.scrollIntoView({behavior: "smooth", block: "center"}); });
+  rows.forEach(row => row.onclick = () => {
+    show(row);
+    stage.scrollIntoView({behavior: "smooth", block: "center"});
+  });
   if (rows.length) { show(rows[rows.length - 1]); stage.hidden = false; }
 }
 """
@@ -52,7 +56,7 @@ def make_page(comparison: Comparison) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n',
         f"<title>{escape(title)}</title>\n<style>\n{_STYLE.read_text(encoding='utf-8')}</style>\n<body>\n",
         f'<header class="verdict {verdict.split()[0]}"><p class="of">Comparison of two results</p>'
-        f"<h1>{verdict.capitalize()}</h1><p>{escape(comparison.method)}</p></header>\n",
+        f"<h1>{verdict.capitalize()}</h1><p>{escape(_sentence(comparison.method))}</p></header>\n",
         f'<div class="sides">{_side("A", comparison.a)}{_side("B", comparison.b)}</div>\n',
         *(_findings(side) for side in (comparison.a, comparison.b) if side.findings),
     ]
@@ -63,6 +67,10 @@ def make_page(comparison: Comparison) -> str:
     parts.append(f"<footer>Written by weathercoat {__version__}. The same as data: {RECORD}.</footer>\n")
     parts.append(f"<script>{_SCRIPT}</script>\n</body>\n</html>\n")
     return "".join(parts)
+
+
+def _sentence(method: str) -> str:
+    return f"{method[:1].upper()}{method[1:]}."
 
 
 def _side(letter: str, side: Side) -> str:
@@ -95,20 +103,22 @@ def _names(names: Iterable[str]) -> str:
 
 def _findings(side: Side) -> str:
     rows = "".join(
-        f'<tr><td class="text"><code>{escape(f"{name}/{finding.file}" if len(side.runs) > 1 else finding.file)}'
-        f'</code></td><td class="text">{escape(finding.message)}</td></tr>'
-        for name, findings in side.findings.items()
+        f'<tr><td class="text"><code>{escape(prefix + finding.file)}</code></td>'
+        f'<td class="text">{escape(finding.message)}</td></tr>'
+        for prefix, findings in side.findings_by_prefix()
         for finding in findings
     )
+    name = escape(str(side.path))
     return (
-        f'<h2>What is wrong with <span class="path">{escape(str(side.path))}</span></h2>'
-        f'<div class="scroll"><table><tr><th>File</th><th class="text">Finding</th></tr>{rows}</table></div>\n'
+        f'<h2>What is wrong with <span class="path">{name}</span></h2><div class="scroll"><table>'
+        f'<tr><th>File</th><th class="text">Finding</th></tr>{rows}</table></div>\n'
     )
 
 
 def _group(group: Group, *, is_titled: bool) -> Iterator[str]:
     if is_titled:
-        yield f"<h2>{escape(group.title)}: {group.judgement.verdict}</h2><p>{escape(group.judgement.method)}</p>\n"
+        method = escape(_sentence(group.judgement.method))
+        yield f"<h2>{escape(group.title)}: {group.judgement.verdict}</h2><p>{method}</p>\n"
     heading = "h3" if is_titled else "h2"
     found = ranked(group.judgement.differences)
     yield f"<{heading}>What differs</{heading}>\n{_table(found)}"
@@ -126,7 +136,7 @@ def _worst_flip(pair: Pair) -> float:
 def _table(found: Sequence[Difference]) -> str:
     """A row a figure, at the age at which it differs most."""
     head = "".join(
-        f"<th>{name}</th>" for name in ("Figure", "Age", "A", "B", "B − A", "Allowed", "Share of it")
+        f"<th>{name}</th>" for name in ("Figure", "Age", "A", "B", f"B {_MINUS} A", "Allowed", "Share of it")
     )
     rows = [_row(difference) for difference in found if difference.difference != 0.0]
     if not rows:
@@ -150,7 +160,7 @@ def _row(difference: Difference) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.3g}".replace("-", "−", 1)
+    return f"{value:+.3g}".replace("-", _MINUS, 1)
 
 
 def _label(figure: str) -> str:
@@ -163,7 +173,8 @@ def _pictures(pairs: Sequence[Pair], pair_count: int) -> str:
         '<div><div class="stage" hidden><img alt="A"><img alt="B"><span class="tag a">A</span>'
         '<span class="tag b">B</span><input type="range" min="0" max="100" value="50" step="0.1"'
         ' aria-label="Slide between A and B"></div>\n',
-        '<div class="heads"><span><span class="tag a">A</span></span><span><span class="tag b">B</span></span>'
+        '<div class="heads"><span><span class="tag a">A</span></span>'
+        '<span><span class="tag b">B</span></span>'
         '<span>Perceived difference, FLIP: 0<span class="ramp"></span>1</span></div>\n',
     ]
     for pair in reversed(pairs[:_MOST_PAIRS]) if pair_count > 1 else pairs:

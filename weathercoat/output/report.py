@@ -264,8 +264,12 @@ def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
     Raises CheckError for a value that is not finite or that JSON has no form for, naming its key, before
     anything is written; OSError where the file cannot be written.
     """
-    text = _text(_plain(content, "", Path(path).name), "\n")
-    Path(path).write_bytes((text + "\n").encode("utf-8", "backslashreplace"))
+    Path(path).write_bytes(format_json(content, Path(path).name).encode("utf-8", "backslashreplace"))
+
+
+def format_json(content: Mapping[str, Any], file: str = "standard output") -> str:
+    """The text of `write_json`, for whatever it is written to."""
+    return _text(_plain(content, "", file), "\n") + "\n"
 
 
 def _text(value: Any, line: str) -> str:
