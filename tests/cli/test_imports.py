@@ -31,6 +31,7 @@ print("LOADED", code, *loaded)
         ["inspect", "--help"],
         ["render", "--help"],
         ["verify", "--help"],
+        ["compare", "--help"],
         ["baseline", "--help"],
         ["baseline", "check", "--help"],
         ["bench", "--help"],

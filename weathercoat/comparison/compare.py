@@ -113,12 +113,12 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
     sides = Side(Path(a), find_runs(a)), Side(Path(b), find_runs(b))
     runs = sides[0].runs, sides[1].runs
     if are_identical(*runs):
-        return Comparison("same", "every file of both sides has the same bytes", *sides, tolerance, {})
+        return Comparison("same", "every file of both sides has the same bytes.", *sides, tolerance, {})
     configs = config_differences(*runs)
     sides = _verified(sides[0]), _verified(sides[1])
     count = sum(len(found) for side in sides for found in side.findings.values())
     if count:
-        method = f"verification finds {count:,} fault{'s' * (count > 1)}, and nothing else was compared"
+        method = f"verification finds {count:,} fault{'s' * (count > 1)}, and nothing else was compared."
         return Comparison("corrupt", method, *sides, tolerance, configs)
     is_single = len(runs[0]) == len(runs[1]) == 1
     groups = tuple(
@@ -130,7 +130,7 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
     method = worst.judgement.method
     if beyond:
         verdict = "different"
-        method += f"; beyond the tolerance: {'; '.join(beyond)}"
+        method += f" Beyond the tolerance: {'; '.join(beyond)}."
     return Comparison(verdict, method, *sides, tolerance, configs, groups, beyond)
 
 

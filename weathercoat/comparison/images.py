@@ -13,7 +13,7 @@ from weathercoat.comparison.sides import Run
 from weathercoat.config.schema import Config
 from weathercoat.mesh.surface import Vectors
 from weathercoat.output.folder import PREVIEW, UNTOUCHED, read_run
-from weathercoat.output.pictures import Image, frame_camera, read_png, render_snapshot
+from weathercoat.output.pictures import Image, contact_sheet, frame_camera, read_png, render_snapshot
 
 _QUALITY = 80
 # Black through violet and orange to white, as pictures of FLIP have it, evenly rising in lightness.
@@ -98,7 +98,8 @@ def _draw(folder: Path, config: Config) -> dict[float, Image]:
     parameters = picture_parameters(config)
     untouched = read_surface(folder / UNTOUCHED) if (folder / UNTOUCHED).exists() else None
     camera = frame_camera(snapshots[0], parameters, up=(x, y, z), untouched=untouched)
-    return {
-        snapshot.age: render_snapshot(snapshot, parameters, up=(x, y, z), untouched=untouched, camera=camera)
-        for snapshot in snapshots
-    }
+    pictures = {}
+    for snapshot in snapshots:
+        image = render_snapshot(snapshot, parameters, up=(x, y, z), untouched=untouched, camera=camera)
+        pictures[snapshot.age] = contact_sheet([image], [f"age {snapshot.age:g}"])
+    return pictures

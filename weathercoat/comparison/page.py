@@ -70,7 +70,7 @@ def make_page(comparison: Comparison) -> str:
 
 
 def _sentence(method: str) -> str:
-    return f"{method[:1].upper()}{method[1:]}."
+    return method[:1].upper() + method[1:]
 
 
 def _side(letter: str, side: Side) -> str:
