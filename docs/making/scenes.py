@@ -19,7 +19,7 @@ def draw_yard() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         _call("sample", "yard", "-o", folder / "yard.glb")
-        how = ("-c", "rusting", "--age", "1.5", "--set", "scene.image_height=600")
+        how = ("-c", "rusting", "--age", "1.5", "--variants", "3", "--set", "scene.image_height=600")
         _call("scene", folder / "yard.yaml", *how, "-o", folder / "rusted", "--quiet")
         sheet = Image.open(folder / "rusted" / "preview.png").convert("RGB")
         sheet.thumbnail((_WIDTH, _WIDTH), Image.Resampling.LANCZOS)
