@@ -79,6 +79,7 @@ subclass of `weathercoat.errors.WeathercoatError` and carries its [code and exit
 
 _EXIT_CODES = {
     0: "done; what was repaired is listed as `W-...`",
+    1: "`compare`: the sides are different, or one is corrupt",
     2: "the command line or the config is not valid",
     3: "the model cannot be read",
     4: "the model holds no usable surface, or needed a repair under `--strict`",
