@@ -10,6 +10,7 @@ import pytest
 from weathercoat.batch.processes import InlineExecutor
 from weathercoat.cli.handler import call
 from weathercoat.comparison.baseline import BASELINE, Baseline, is_baseline, pair_with_baseline, read_baseline
+from weathercoat.comparison.compare import compare
 from weathercoat.comparison.golden import check_baseline, record_baseline
 from weathercoat.comparison.judgement import judge
 from weathercoat.config.load import load_config
@@ -114,6 +115,9 @@ def test_runs_are_held_against_the_model_that_they_are_of(golden: Path, tmp_path
     assert [len(side) for side in alone["b"]] == [4, 1]
     both = pair_with_baseline(golden, golden / BASELINE)
     assert [judge(*sides).verdict for sides in both.values()] == ["same", "same"]
+    found = compare(tmp_path, golden)
+    assert found.verdict == "same"
+    assert [group.title for group in found.groups] == ["a", "b"]
     with pytest.raises(AccessError, match=r"no run\.json"):
         pair_with_baseline(models, golden)
     run_asset(loaded, _sheet(tmp_path / "c.obj", 60), tmp_path / "c")

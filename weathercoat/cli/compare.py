@@ -40,7 +40,8 @@ def command(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Compare A and B, each the folder of a finished run, or a folder of several such as that of a batch.
+    """Compare A and B, each the folder of a finished run, a folder of several such as that of a batch, or a
+    baseline.
 
     They are the same, or within the noise between seeds, and then the exit code is 0; or they are different,
     or one is corrupt, and then it is 1.

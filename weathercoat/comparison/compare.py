@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from weathercoat.comparison.baseline import is_baseline, pair_with_baseline
 from weathercoat.comparison.geometry import GeometryDifference, compare_snapshots
 from weathercoat.comparison.images import PictureDifference, compare_pictures, read_pictures
 from weathercoat.comparison.judgement import Judgement, judge
@@ -100,7 +101,7 @@ class Comparison:
 
 
 def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) -> Comparison:
-    """Compare two runs, or two folders of runs.
+    """Compare two runs, two folders of runs, or either of them with a baseline.
 
     Runs whose files are the same bytes are the same. A run that `verify` finds fault with makes its side
     corrupt. Else the figures decide, as `judgement.judge` does, and geometry and pictures where the tolerance
@@ -110,6 +111,8 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
     Raises AccessError where a folder holds no run, and what reading its files raises.
     """
     tolerance = tolerance or Tolerance()
+    if is_baseline(a) or is_baseline(b):
+        return _compare_with_baseline(a, b, tolerance)
     sides = Side(Path(a), find_runs(a)), Side(Path(b), find_runs(b))
     runs = sides[0].runs, sides[1].runs
     if are_identical(*runs):
@@ -132,6 +135,17 @@ def compare(a: Path | str, b: Path | str, tolerance: Tolerance | None = None) ->
         verdict = "different"
         method += f" Beyond the tolerance: {'; '.join(beyond)}."
     return Comparison(verdict, method, *sides, tolerance, configs, groups, beyond)
+
+
+def _compare_with_baseline(a: Path | str, b: Path | str, tolerance: Tolerance) -> Comparison:
+    """Judge figures alone, model by model: a baseline keeps no meshes."""
+    groups = tuple(
+        Group(title, *figures, judge(*figures, tolerance), ())
+        for title, figures in pair_with_baseline(a, b).items()
+    )
+    worst = max(groups, key=lambda group: VERDICTS.index(group.judgement.verdict)).judgement
+    sides = Side(Path(a), ()), Side(Path(b), ())
+    return Comparison(worst.verdict, worst.method, *sides, tolerance, {}, groups)
 
 
 def _verified(side: Side) -> Side:
