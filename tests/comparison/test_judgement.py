@@ -53,6 +53,15 @@ def test_one_run_that_is_far_off_is_different() -> None:
     assert {row.figure for row in judgement.differences if row.is_beyond} == {"dust"}
 
 
+def test_coarser_films_vary_more() -> None:
+    def allowed(faces: int | None) -> float:
+        runs = [dataclasses.replace(make_run(seed), faces=faces) for seed in (1, 2)]
+        return judge(runs[:1], runs[1:]).differences[0].allowed
+
+    assert allowed(30_000) == allowed(3_000) == allowed(None)
+    assert allowed(750) == pytest.approx(2.0 * allowed(3_000))
+
+
 def test_five_against_five_is_an_exact_test() -> None:
     judgement = judge(make_group(1, 5), make_group(11, 5))
     assert judgement.verdict == "within noise"

@@ -109,6 +109,7 @@ class _Table(NamedTuple):
     values: NDArray[np.float64]
     length: NDArray[np.float64]  # (runs, ages), of cracks and outlines
     first: int  # runs of the first group
+    faces: int | None  # of the coarsest film, where that is known
 
     @property
     def a(self) -> NDArray[np.float64]:
@@ -148,7 +149,9 @@ def _align(a: Sequence[RunFigures], b: Sequence[RunFigures], tolerance: Toleranc
         )
 
     length = take("crack_length") + take("outline_length")
-    return _Table(figures, ages, np.stack([take(figure) for figure in figures], axis=1), length, len(a))
+    values = np.stack([take(figure) for figure in figures], axis=1)
+    faces = min((run.faces for run in runs if run.faces is not None), default=None)
+    return _Table(figures, ages, values, length, len(a), faces)
 
 
 def _place(age: float, run: RunFigures) -> int | None:
@@ -188,7 +191,10 @@ def _spreads(table: _Table) -> tuple[NDArray[np.float64], float, str]:
     """
     mean, length = table.values.mean(axis=0), table.length.mean(axis=0)
     shipped = np.stack(
-        [expected_spread(figure, values, length) for figure, values in zip(table.figures, mean, strict=True)]
+        [
+            expected_spread(figure, values, length, table.faces)
+            for figure, values in zip(table.figures, mean, strict=True)
+        ]
     )
     shipped = np.maximum(shipped, ROUND_OFF * np.abs(mean))
     freedom = len(table.values) - 2

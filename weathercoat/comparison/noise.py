@@ -2,12 +2,14 @@
 
 What was measured follows simple laws: numbers and areas of patches spread by their square root, and means
 over what lies along cracks the less, the longer these are. So one coefficient for each figure serves for
-models and ages that were not measured, roughly.
+models and ages that were not measured, roughly. Films of fewer faces than those vary more, as a mean over so
+many fewer does.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -70,11 +72,12 @@ def unit_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
     return np.abs(values) ** law.value * rest * np.maximum(length, _LEAST_LENGTH) ** -law.length
 
 
-def expected_spread(figure: str, values: Vectors, length: Vectors) -> Vectors:
+def expected_spread(figure: str, values: Vectors, length: Vectors, faces: int | None = None) -> Vectors:
     """The standard deviation between seeds to be expected of a figure at each of several ages; see
-    `unit_spread`.
+    `unit_spread`. faces: of the films; None for as many as were measured.
     """
-    return _shipped()[figure]["at_an_age"] * unit_spread(figure, values, length)
+    coarse = 1.0 if faces is None else math.sqrt(max(_measured_faces() / faces, 1.0))
+    return _shipped()[figure]["at_an_age"] * coarse * unit_spread(figure, values, length)
 
 
 def expected_spread_of_mean(figure: str) -> float:
@@ -89,3 +92,9 @@ def _shipped() -> Mapping[str, Mapping[str, float]]:
     """The measured coefficients of each figure, below which 9 in 10 cases lie."""
     content: Mapping[str, Mapping[str, float]] = json.loads(SHIPPED.read_bytes())["figures"]
     return content
+
+
+@cache
+def _measured_faces() -> int:
+    """The faces of the films that were measured."""
+    return int(json.loads(SHIPPED.read_bytes())["faces"])

@@ -36,11 +36,13 @@ class RunFigures:
     """The figures of a run: for each its values at the ages of the snapshots, in their order.
 
     Lengths are in sizes, the square root of the film's area at the start, and areas in squares of them.
+    faces: of the film at the start; None where that is not known.
     """
 
     name: str
     ages: tuple[float, ...]
     figures: Mapping[str, tuple[float, ...]]
+    faces: int | None = None
 
 
 def measure_run(folder: Path | str) -> RunFigures:
@@ -54,6 +56,7 @@ def measure_run(folder: Path | str) -> RunFigures:
     try:
         rows = report["snapshots"]
         size = float(report["meshes"]["film"]["area"]) ** 0.5
+        faces = int(report["meshes"]["film"]["faces"])
         ages = tuple(float(row["age"]) for row in rows)
         figures = {
             name: tuple(float(_at(row, keys)) / size**power for row in rows)
@@ -66,7 +69,7 @@ def measure_run(folder: Path | str) -> RunFigures:
     if all(file.exists() for file in files):
         patterns = [measure_pattern(read_snapshot_ply(file)) for file in files]
         figures |= {name: tuple(pattern[name] for pattern in patterns) for name in PATTERN_FIGURES}
-    return RunFigures(folder.name, ages, figures)
+    return RunFigures(folder.name, ages, figures, faces)
 
 
 def read_report(folder: Path) -> dict[str, Any]:
