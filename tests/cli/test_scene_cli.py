@@ -36,7 +36,7 @@ def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str
     assert call(["scene", "shed.yaml", "--dry-run"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines[:4]] == ["object", "roof", "under", "open"]
-    assert lines[4].startswith("objects: 3, weathered: 3; meshes: 1; results: 2, about")
+    assert lines[4].startswith("objects: 3, weathered: 3; meshes: 1; results: 3, about")
     assert call(["scene", "shed.yaml", "--dry-run", "--json", "--variants", "each"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert [row["name"] for row in report["variants"]] == ["roof", "under", "open"]
@@ -53,7 +53,7 @@ def test_a_scene_lands_in_a_folder_of_its_name(scene: Path, capsys: pytest.Captu
 def test_events_for_machines(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["scene", "shed.yaml", *SMALL, "--json", "-o", "out"]) == 0
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [event["event"] for event in events] == ["job", "job", "end"]
+    assert [event["event"] for event in events] == ["job", "job", "job", "end"]
     assert events[-1] == {"event": "end", "folder": "out"}
 
 
@@ -63,7 +63,7 @@ def test_what_fails_is_named(scene: Path, capsys: pytest.CaptureFixture[str]) ->
     assert call(["scene", "shed.yaml", *small, "-o", "out", "--max-memory", "1G", "-c", "draft.yaml"]) == 2
     Path("draft.yaml").write_text("remesh: {faces: 300}\n")
     assert call(["scene", "shed.yaml", *small, "-o", "out", "--max-memory", "1G", "-c", "draft.yaml"]) == 8
-    assert "1 of 2 results failed: box" in capsys.readouterr().err
+    assert "1 of 3 results failed: box" in capsys.readouterr().err
     assert Path("out/scene.glb").is_file()
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from tests.scene.yards import at, box, yard
 from weathercoat.scene.graph import Rule, SceneObject
 from weathercoat.scene.groups import (
+    LARGEST_SPREAD,
     LARGEST_TILT,
     Member,
     Variant,
@@ -45,9 +46,27 @@ def names(variants: Sequence[Variant]) -> dict[str, list[str]]:
 
 
 def test_instances_share_one_result_with_the_mean_degree() -> None:
-    variants = group_members([member(box("a"), 0.2), member(box("b", 5), 0.4), member(box("c", 9), 0.6)])
+    variants = group_members([member(box("a"), 0.3), member(box("b", 5), 0.4), member(box("c", 9), 0.5)])
     assert names(variants) == {"cube": ["a", "b", "c"]}
     assert variants[0].weathering.degree == pytest.approx(0.4)
+
+
+def test_instances_that_weather_otherwise_have_results_of_their_own() -> None:
+    degrees = {"a": 0.6, "b": 0.15, "c": 0.55, "d": 0.3, "e": 0.9}
+    variants = group_members([member(box(name, 5 * i), d) for i, (name, d) in enumerate(degrees.items())])
+    assert names(variants) == {"cube-v1": ["b", "d"], "cube-v2": ["a", "c"], "cube-v3": ["e"]}
+    one = group_members([member(box(name, i), d, variants=1) for i, (name, d) in enumerate(degrees.items())])
+    assert names(one) == {"cube": list(degrees)}
+
+
+@given(st.lists(st.integers(0, 100), min_size=1, max_size=30))
+def test_no_result_is_of_degrees_far_apart(percents: list[int]) -> None:
+    degrees = [p / 100 for p in percents]
+    variants = group_members([member(box(f"o{i}", i), d) for i, d in enumerate(degrees)])
+    for variant in variants:
+        found = [m.weathering.degree for m in variant.members]
+        assert max(found) - min(found) <= LARGEST_SPREAD
+    assert len(variants) <= 1 + (max(degrees) - min(degrees)) / LARGEST_SPREAD
 
 
 def test_a_turn_about_the_vertical_and_an_even_scale_do_not_matter() -> None:

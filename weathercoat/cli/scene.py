@@ -47,7 +47,8 @@ class _Variants(click.ParamType):
 )  # fmt: skip
 @click.option(
     "--variants", type=_Variants(), metavar="N",
-    help="How many results the instances of a mesh share whose rules do not tell, or each.",
+    help="How many results the instances of a mesh share whose rules do not tell, or each; by default as "
+    "many as their degrees ask for.",
 )  # fmt: skip
 @options.seed
 @options.quality
@@ -86,8 +87,8 @@ def command(
 
     The folder gets scene.glb, which loads as the scene did, with the same names and transforms; scene.json,
     which tells of each object's exposure, degree and detail; a picture; and a run for each result in objects.
-    Objects that place the same mesh share one result unless the scene's rules ask for more. What is done
-    already and unchanged is not done again.
+    Objects that place the same mesh share one result unless they weather otherwise, or rules say so. What is
+    done already and unchanged is not done again.
 
     \b
     weathercoat sample yard -o yard.glb

@@ -17,6 +17,9 @@ from weathercoat.scene.weathering import Weathering
 
 # Instances whose upward directions differ by more, in their own axes, never share a result: rust runs down.
 LARGEST_TILT = 10.0  # degrees
+LARGEST_SPREAD = (
+    0.2  # of the degrees of weathering within a result, where rules do not say how many there are
+)
 _SEED_SHIFT = 75  # of 128 bits: seeds of 53 bits are whole in every reader of JSON
 _DIGITS = 5  # of the shape of a stretch, for comparison
 
@@ -96,7 +99,8 @@ def group_members(members: Sequence[Member]) -> list[Variant]:
 
     Instances share a set where mesh, rules, shape of the scale, handedness and upward direction agree. A set
     is one variant, named as the mesh where it is the first of that, else with its first object behind it; or
-    as many as its rules say, by degree, from the least weathered on; or one for `each` object, named as that.
+    several by degree, from the least weathered on: as many as its rules say, else as few as keep the degrees
+    of each within `LARGEST_SPREAD`; or one for `each` object, named as that.
     """
     taken: set[str] = set()
     named: set[str] = set()
@@ -110,7 +114,8 @@ def group_members(members: Sequence[Member]) -> list[Variant]:
             parts = [(m.item.name, [m]) for m in group]
         else:
             named.add(mesh)
-            clusters = cluster_degrees([m.weathering.degree for m in group], wanted or 1)
+            degrees = [m.weathering.degree for m in group]
+            clusters = _cluster_closely(degrees) if wanted is None else cluster_degrees(degrees, wanted)
             count = int(clusters.max()) + 1
             parts = [
                 (
@@ -153,6 +158,20 @@ def cluster_degrees(degrees: Sequence[float], count: int) -> NDArray[np.int64]:
     for clusters in range(k, 0, -1):
         label[cut[clusters, end] : end] = clusters - 1
         end = cut[clusters, end]
+    return label[place]  # type: ignore[no-any-return]
+
+
+def _cluster_closely(degrees: Sequence[float]) -> NDArray[np.int64]:
+    """The cluster of each degree, 0 for the lowest: the fewest that are no wider than `LARGEST_SPREAD`, each
+    from its lowest degree on.
+    """
+    values, place = np.unique(np.asarray(degrees), return_inverse=True)
+    label, lowest = np.zeros(len(values), np.int64), values[0]
+    for i in range(1, len(values)):
+        is_beyond = values[i] - lowest > LARGEST_SPREAD
+        label[i] = label[i - 1] + is_beyond
+        if is_beyond:
+            lowest = values[i]
     return label[place]  # type: ignore[no-any-return]
 
 
