@@ -130,11 +130,13 @@ def test_a_batch_that_was_stopped_goes_on(how: signal.Signals, models: Path, tmp
         time.sleep(0.01)
     workers = children(batch.pid)
     batch.send_signal(how)
-    batch.communicate()
+    _, said = batch.communicate()
     codes = {signal.SIGKILL: -signal.SIGKILL, signal.SIGINT: 130, signal.SIGTERM: 143}
     assert batch.returncode == codes[how] or (
         batch.returncode == 0 and len(list(out.glob("[a-z]/run.json"))) == 3
     )
+    if batch.returncode > 0:
+        assert f"what is done is kept in {out}; give the same command again to go on" in said
     while any(is_running(worker) for worker in workers):
         assert time.monotonic() < deadline
         time.sleep(0.01)

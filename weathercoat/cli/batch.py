@@ -105,7 +105,7 @@ def command(
     """
     from weathercoat.batch.batch import run_batch
     from weathercoat.batch.sources import collect_jobs
-    from weathercoat.cli.executing import Teller, make_executor, pool_size
+    from weathercoat.cli.executing import Teller, make_executor, pool_size, say_how_to_go_on
     from weathercoat.cli.messages import Messages
     from weathercoat.cli.pricing import price_lines, price_of
     from weathercoat.memory import memory_limit
@@ -137,7 +137,7 @@ def command(
         return
     if limit is not None and kind == "processes":
         max_memory = round(limit.bytes)  # of all workers, which do not ask again while others are at work
-    with Messages(quiet=quiet or as_json, log_file=log_file) as messages:
+    with Messages(quiet=quiet or as_json, log_file=log_file) as messages, say_how_to_go_on(output):
         teller = Teller(messages, as_json=as_json)
         record = run_batch(
             found,

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from weathercoat.cli.signals import Stopped
 
 if TYPE_CHECKING:
     from weathercoat.batch.job import Executor, Outcome, Progress, Task
@@ -36,6 +39,16 @@ def make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimi
         assert scheduler is not None
         return DaskExecutor(scheduler)
     return ProcessExecutor(size, float("inf") if limit is None else limit.bytes)
+
+
+@contextmanager
+def say_how_to_go_on(folder: str) -> Iterator[None]:
+    """Note on a signal that ends the block that what is done stays, and how to go on."""
+    try:
+        yield
+    except Stopped as stopped:
+        stopped.add_note(f"what is done is kept in {folder}; give the same command again to go on")
+        raise
 
 
 class Teller:

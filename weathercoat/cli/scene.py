@@ -94,7 +94,7 @@ def command(
     weathercoat sample yard -o yard.glb
     weathercoat scene yard.yaml -c rusting -o aged
     """
-    from weathercoat.cli.executing import Teller, make_executor, pool_size
+    from weathercoat.cli.executing import Teller, make_executor, pool_size, say_how_to_go_on
     from weathercoat.cli.messages import Messages
     from weathercoat.memory import memory_limit
     from weathercoat.run import report_compiling
@@ -117,20 +117,21 @@ def command(
         size = pool_size("processes", workers)
         limit = memory_limit(max_memory)
         teller = Teller(messages, as_json=as_json)
-        report = age_scene(
-            plan,
-            scene.name,
-            out,
-            make_executor("processes", size, None, limit),
-            workers=size,
-            threads=options.threads_beside(size),
-            check=check,
-            max_memory=None if limit is None else round(limit.bytes),
-            preview=preview,
-            begin=teller.begin,
-            listen=teller,
-            log=messages.log,
-        )
+        with say_how_to_go_on(str(out)):
+            report = age_scene(
+                plan,
+                scene.name,
+                out,
+                make_executor("processes", size, None, limit),
+                workers=size,
+                threads=options.threads_beside(size),
+                check=check,
+                max_memory=None if limit is None else round(limit.bytes),
+                preview=preview,
+                begin=teller.begin,
+                listen=teller,
+                log=messages.log,
+            )
     if as_json:
         click.echo(json.dumps({"event": "end", "folder": str(out)}, ensure_ascii=False))
     elif not quiet:
