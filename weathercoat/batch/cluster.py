@@ -19,7 +19,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -27,7 +26,7 @@ from uuid import uuid4
 
 from weathercoat.batch.job import Outcome, Progress, Task
 from weathercoat.batch.storage import is_url
-from weathercoat.batch.work import do_task
+from weathercoat.batch.work import SparingProgress, do_task
 from weathercoat.cost import in_megabytes
 from weathercoat.errors import (
     ClusterError,
@@ -46,7 +45,6 @@ SECONDS_TO_CONNECT = 10.0
 SECONDS_WITHOUT_WORKERS = 60.0
 _SECONDS_BETWEEN_LOOKS = 1.0
 _SECONDS_OF_A_CALL = 10.0
-_SECONDS_BETWEEN_PROGRESS = 0.2
 _SECONDS_BETWEEN_TRIES = 0.2
 _PROCESSOR = "processor"
 _SHARE_OF_MEMORY = 0.9  # a nanny ends its worker at 0.95
@@ -452,23 +450,12 @@ def work(task: Task, topic: str) -> Outcome:
 
     worker = get_worker()
     wanted = _Wanted(worker)
-    tell = _Teller(partial(worker.log_event, topic), worker.get_current_task())
+    key = worker.get_current_task()
+
+    def tell(done: int, total: int) -> None:
+        worker.log_event(topic, {"key": key, "done": done, "total": total})
+
     try:
-        return do_task(task, tell, wanted, seconds_to_wait=60.0 + 10.0 * task.seconds)
+        return do_task(task, SparingProgress(tell), wanted, seconds_to_wait=60.0 + 10.0 * task.seconds)
     except _Unwanted:
         return Outcome(task.job.name, "dropped")
-
-
-class _Teller:
-    """Tells of progress, but not more often than people can see."""
-
-    def __init__(self, tell: Callable[[dict[str, Any]], object], key: Any) -> None:
-        self._tell = tell
-        self._key = key
-        self._told = float("-inf")
-
-    def __call__(self, done: int, total: int) -> None:
-        now = time.monotonic()
-        if now - self._told >= _SECONDS_BETWEEN_PROGRESS:
-            self._told = now
-            self._tell({"key": self._key, "done": done, "total": total})

@@ -6,14 +6,13 @@ It appears whole each time, so that whoever watches a batch reads it at any mome
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from weathercoat.batch.job import Job, Outcome
+from weathercoat.batch.job import Job, Outcome, Status
 from weathercoat.batch.price import Price
 from weathercoat.output.folder import output_errors
 from weathercoat.output.report import versions, write_json
@@ -26,7 +25,7 @@ _SHARE_OF_TIME = 0.02  # that writing may take; a large record is written less o
 
 
 class Record:
-    """What is known of each job of a batch in the folder `out`; `changed` writes it when it is time."""
+    """What is known of each job of a batch in the folder `out`; what is noted is written when it is time."""
 
     def __init__(self, out: Path, jobs: Sequence[Job], prices: Mapping[str, Price], workers: int) -> None:
         self._path = out / RECORD
@@ -50,10 +49,8 @@ class Record:
     def note_outcome(self, outcome: Outcome) -> None:
         """A job has ended."""
         row = self._rows[outcome.name]
-        row.pop("steps_done", None)
-        row.pop("steps", None)
+        _end_row(row, outcome.status)
         row.update(
-            status=outcome.status,
             seconds=round(outcome.seconds, 3),
             attempts=outcome.attempts,
             figures=outcome.figures,
@@ -69,9 +66,7 @@ class Record:
         self.state = state
         for row in self._rows.values():
             if row["status"] in ("waiting", "running"):
-                row.pop("steps_done", None)
-                row.pop("steps", None)
-                row["status"] = "dropped"
+                _end_row(row, "dropped")
         return self.write()
 
     def _as_dict(self) -> dict[str, Any]:
@@ -94,7 +89,7 @@ class Record:
         aside = self._path.with_name(f".{RECORD}.partial")
         with output_errors(self._path):
             write_json(aside, content)
-            os.replace(aside, self._path)  # noqa: PTH105
+            aside.replace(self._path)
         took = time.monotonic() - began
         self._next_write = began + max(_SECONDS_BETWEEN_WRITES, took / _SHARE_OF_TIME)
         return content
@@ -126,6 +121,13 @@ def _row(job: Job, price: Price | None) -> dict[str, Any]:
         "error": None,
         "messages": [],
     }
+
+
+def _end_row(row: dict[str, Any], status: Status) -> None:
+    """Let a job end, which has no steps to go then."""
+    row["status"] = status
+    for key in ("steps_done", "steps"):
+        row.pop(key, None)
 
 
 def _changed_keys(job: Job) -> list[tuple[str, Any]]:

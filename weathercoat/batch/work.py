@@ -18,6 +18,21 @@ from weathercoat.sim.recorders import Patience
 
 SECONDS_TO_WAIT = 10.0
 _SECONDS_BETWEEN_TRIES = 0.2
+_SECONDS_BETWEEN_PROGRESS = 0.2
+
+
+class SparingProgress:
+    """Passes on the steps done of a task and their number, but not more often than people can see."""
+
+    def __init__(self, tell: Callable[[int, int], object]) -> None:
+        self._tell = tell
+        self._next = 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + _SECONDS_BETWEEN_PROGRESS
+            self._tell(done, total)
 
 
 def do_task(

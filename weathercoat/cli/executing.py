@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from weathercoat.cli.signals import Stopped
+from weathercoat.cli.signals import Patience, Stopped
 
 if TYPE_CHECKING:
     from weathercoat.batch.job import Executor, Outcome, Progress, Task
@@ -30,8 +30,6 @@ def make_executor(kind: str, size: int, scheduler: str | None, limit: MemoryLimi
     from weathercoat.batch.processes import InlineExecutor, ProcessExecutor
 
     if kind == "in-process":
-        from weathercoat.cli.signals import Patience
-
         return InlineExecutor(Patience)
     if kind == "dask":
         from weathercoat.batch.cluster import DaskExecutor

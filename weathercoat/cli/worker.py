@@ -8,9 +8,9 @@ from __future__ import annotations
 import os
 import pickle
 import sys
-import time
+from functools import partial
 from queue import SimpleQueue
-from threading import Lock, Thread
+from threading import Thread
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from weathercoat.cli import prepare_process
@@ -19,8 +19,6 @@ from weathercoat.unfinished import clear_all
 
 if TYPE_CHECKING:
     from weathercoat.batch.job import Outcome, Progress, Task
-
-_SECONDS_BETWEEN_PROGRESS = 0.2
 
 
 def serve() -> NoReturn:
@@ -34,47 +32,27 @@ def serve() -> NoReturn:
     tasks: SimpleQueue[Task] = SimpleQueue()
     Thread(target=_receive, args=(tasks_in, tasks), daemon=True).start()
     try:
-        from weathercoat.batch.work import do_task
+        from weathercoat.batch.work import SparingProgress, do_task
 
-        say = _Teller(events_out)
         while True:
             task = tasks.get()
-            say(do_task(task, say.progress_of(task.job.name), Patience()))
+            progress = SparingProgress(partial(_tell_progress, events_out, task.job.name))
+            _tell(events_out, do_task(task, progress, Patience()))
     except (Stopped, BrokenPipeError) as stopped:
         sys.stderr = None  # type: ignore[assignment]  # who asked has no need of words
         code = stopped.exit_code if isinstance(stopped, Stopped) else 1
     os._exit(code)
 
 
-class _Teller:
-    """Writes events, progress not too often."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._lock = Lock()
-
-    def __call__(self, event: Progress | Outcome) -> None:
-        with self._lock:
-            pickle.dump(event, self._stream)
-            self._stream.flush()
-
-    def progress_of(self, name: str) -> _ProgressOf:
-        """What to call with the steps done of a job and their number."""
-        return _ProgressOf(self, name)
+def _tell(stream: BinaryIO, event: Progress | Outcome) -> None:
+    pickle.dump(event, stream)
+    stream.flush()
 
 
-class _ProgressOf:
-    def __init__(self, say: _Teller, name: str) -> None:
-        self._say, self._name = say, name
-        self._next = 0.0
+def _tell_progress(stream: BinaryIO, name: str, done: int, total: int) -> None:
+    from weathercoat.batch.job import Progress
 
-    def __call__(self, done: int, total: int) -> None:
-        from weathercoat.batch.job import Progress
-
-        now = time.monotonic()
-        if now >= self._next:
-            self._next = now + _SECONDS_BETWEEN_PROGRESS
-            self._say(Progress(self._name, done, total))
+    _tell(stream, Progress(name, done, total))
 
 
 def _receive(stream: BinaryIO, tasks: SimpleQueue[Task]) -> None:

@@ -200,9 +200,13 @@ def _spreads(table: _Table) -> tuple[NDArray[np.float64], float, str]:
     freedom = len(table.values) - 2
     if freedom == 0:
         return shipped, math.inf, "the noise measured on other models, a rough judgement"
-    squares = sum(((group - group.mean(axis=0)) ** 2).sum(axis=0) for group in (table.a, table.b))
-    own = np.sqrt(np.asarray(squares) / freedom)
+    own = np.sqrt(_squares_within(table.a, table.b) / freedom)
     return np.where(own > ROUND_OFF * np.abs(mean), own, shipped), freedom, "the noise within the groups"
+
+
+def _squares_within(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The sum over the runs of two groups of the squared distance to the mean of their group."""
+    return ((a - a.mean(axis=0)) ** 2).sum(axis=0) + ((b - b.mean(axis=0)) ** 2).sum(axis=0)
 
 
 def _test(
@@ -285,8 +289,7 @@ def _test_by_figures(
     deviation = np.array([expected_spread_of_mean(figure) for figure in table.figures])
     if not math.isinf(freedom):
         own = _scores(table)
-        a, b = own[: table.first], own[table.first :]
-        squares = ((a - a.mean(axis=0)) ** 2).sum(axis=0) + ((b - b.mean(axis=0)) ** 2).sum(axis=0)
+        squares = _squares_within(own[: table.first], own[table.first :])
         varies = squares > ROUND_OFF  # in units of the spread over all runs
         scores, deviation = (
             np.where(varies, own, scores),

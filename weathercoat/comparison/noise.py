@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,25 +76,25 @@ def expected_spread(figure: str, values: Vectors, length: Vectors, faces: int | 
     """The standard deviation between seeds to be expected of a figure at each of several ages; see
     `unit_spread`. faces: of the films; None for as many as were measured.
     """
-    coarse = 1.0 if faces is None else math.sqrt(max(_measured_faces() / faces, 1.0))
-    return _shipped()[figure]["at_an_age"] * coarse * unit_spread(figure, values, length)
+    coarse = 1.0 if faces is None else math.sqrt(max(_shipped()["faces"] / faces, 1.0))
+    return _coefficients(figure)["at_an_age"] * coarse * unit_spread(figure, values, length)
 
 
 def expected_spread_of_mean(figure: str) -> float:
     """The standard deviation to be expected of a figure's mean over the ages, each in units of
     `expected_spread`: the less, the less its ages have to do with each other.
     """
-    return _shipped()[figure]["of_the_mean"] / _shipped()[figure]["at_an_age"]
+    return _coefficients(figure)["of_the_mean"] / _coefficients(figure)["at_an_age"]
+
+
+def _coefficients(figure: str) -> Mapping[str, float]:
+    """The measured coefficients of a figure, below which 9 in 10 cases lie."""
+    coefficients: Mapping[str, float] = _shipped()["figures"][figure]
+    return coefficients
 
 
 @cache
-def _shipped() -> Mapping[str, Mapping[str, float]]:
-    """The measured coefficients of each figure, below which 9 in 10 cases lie."""
-    content: Mapping[str, Mapping[str, float]] = json.loads(SHIPPED.read_bytes())["figures"]
+def _shipped() -> Mapping[str, Any]:
+    """What was measured: the coefficients of the `figures`, on films of so many `faces`."""
+    content: Mapping[str, Any] = json.loads(SHIPPED.read_bytes())
     return content
-
-
-@cache
-def _measured_faces() -> int:
-    """The faces of the films that were measured."""
-    return int(json.loads(SHIPPED.read_bytes())["faces"])
