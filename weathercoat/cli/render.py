@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +10,9 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.cli.writing import STANDARD_OUTPUT, open_output, say_written
-from weathercoat.errors import CorruptError, UsageError
+from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
-    from weathercoat.config.schema import Config
     from weathercoat.output.pictures import Image
 
 
@@ -53,43 +51,20 @@ def command(
 
 def _draw(run: Path, step: int | None, view: dict[str, Any]) -> Image:
     """The picture of one step, or the contact sheet of all."""
-    from weathercoat.mesh.read import read_surface
-    from weathercoat.output.folder import REPORT, read_run
+    from weathercoat.finished import open_run
     from weathercoat.output.pictures import contact_sheet, frame_camera, render_snapshot
     from weathercoat.recording import picture_parameters
 
-    if not os.path.exists(run / REPORT) and os.path.exists(run.parent / REPORT):  # noqa: PTH110 (any text)
-        run = run.parent
-    report, snapshots = read_run(run)
-    if step is not None:
-        snapshots = [snapshot for snapshot in snapshots if snapshot.step == step]
-        if not snapshots:
-            steps = ", ".join(str(row["step"]) for row in report["snapshots"])
-            raise UsageError(
-                f"the run has no snapshot of step {step}", file=str(run), remedy=f"there are {steps}"
-            )
-    config = _config_of(report, run / REPORT)
-    parameters = replace(picture_parameters(config), **view)
-    x, y, z = report["meshes"]["input"]["up"]
-    up = (x, y, z)
-    untouched = run / "untouched.ply"
-    unpainted = read_surface(untouched) if untouched.exists() else None
-    camera = frame_camera(snapshots[0], parameters, up=up, untouched=unpainted)
+    finished = open_run(run)
+    steps = finished.steps if step is None else [step]
+    snapshots = [finished.read_snapshot(number) for number in steps]
+    parameters = replace(picture_parameters(finished.config), **view)
+    up, untouched = finished.up, finished.untouched
+    camera = frame_camera(snapshots[0], parameters, up=up, untouched=untouched)
     images = [
-        render_snapshot(snapshot, parameters, up=up, untouched=unpainted, camera=camera)
+        render_snapshot(snapshot, parameters, up=up, untouched=untouched, camera=camera)
         for snapshot in snapshots
     ]
     if step is not None:
         return images[0]
     return contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in snapshots])
-
-
-def _config_of(report: dict[str, Any], path: Path) -> Config:
-    from pydantic import ValidationError
-
-    from weathercoat.config.schema import Config
-
-    try:
-        return Config.model_validate(report.get("config"))
-    except ValidationError as error:
-        raise CorruptError("holds no config of this version", file=str(path), remedy="run again") from error

@@ -50,17 +50,21 @@ def order_surface(surface: Surface, points: Vectors) -> tuple[Surface, Indices]:
     rank[order] = np.arange(len(order), dtype=np.int32)
     faces, turn = rank[surface.faces], np.empty(len(surface.faces), np.int8)
     _begin_with_smallest(faces, turn)
-    uv = surface.uv
-    if uv is not None:
-        uv = np.take_along_axis(uv, (turn[:, None, None] + np.arange(3)[:, None]) % 3, axis=1)
+    turned = (turn[:, None, None] + np.arange(3)[:, None]) % 3
     face_order = order_rows(faces, len(points))
-    place = surface.place
+    place, face_part = surface.place, surface.face_part
+
+    def corners(values: Vectors | None) -> Vectors | None:
+        return None if values is None else np.take_along_axis(values, turned, axis=1)[face_order]
+
     ordered = replace(
         surface,
         vertices=surface.vertices[order],
         faces=faces[face_order],
         face_group=surface.face_group[face_order],
-        uv=None if uv is None else uv[face_order],
+        uv=corners(surface.uv),
+        normals=corners(surface.normals),
+        face_part=None if face_part is None else face_part[face_order],
         colors=None if surface.colors is None else surface.colors[order],
         place=None if place is None else Place(place.face[order], place.barycentric[order]),
     )

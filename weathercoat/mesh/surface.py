@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from weathercoat.errors import Note
 from weathercoat.mesh.buckets import compact_indices
+from weathercoat.mesh.materials import SourceMaterial
 
 Vectors = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -31,6 +32,38 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Part:
+    """What faces of the input belong to: a primitive of a node of glTF, or an object of another format.
+
+    name: of the node or the object. material: a number in `Surface.materials`, or -1. node: the number of the
+    node in the glTF document, or -1. matrix: from the node's axes to the model's, sixteen numbers row after
+    row.
+    """
+
+    name: str
+    material: int = -1
+    node: int = -1
+    matrix: tuple[float, ...] = (
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    )
+
+
+@dataclass(frozen=True)
 class Surface:
     """A triangle mesh in the model's units.
 
@@ -39,7 +72,9 @@ class Surface:
     2), a texture coordinate per corner of a face, v upwards (seams need no duplicate vertices), or None.
     colors: float64 (n, 4), the input's vertex colours (RGBA, 0 to 1), or None. up: unit vector (3,) against
     gravity, in the model's axes. notes: repairs that were made and what could not be kept. place: where each
-    vertex lies on the input surface; None for the input itself.
+    vertex lies on the input surface; None for the input itself. normals: float64 (m, 3, 3), the unit shading
+    normal of each corner, or None where the input has none. face_part: int32 (m,), for each face an index
+    into `parts`, or None where nothing is known of parts; materials: those of the parts.
     """
 
     vertices: Vectors
@@ -51,6 +86,10 @@ class Surface:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     notes: tuple[Note, ...] = ()
     place: Place | None = None
+    normals: Vectors | None = None
+    face_part: Indices | None = None
+    parts: tuple[Part, ...] = ()
+    materials: tuple[SourceMaterial, ...] = ()
     name: str = "model"
     format: str = ""
 
@@ -92,6 +131,8 @@ class Surface:
             uv=None if self.uv is None else self.uv[keep],
             colors=None if self.colors is None else self.colors[used],
             place=place,
+            normals=None if self.normals is None else self.normals[keep],
+            face_part=None if self.face_part is None else self.face_part[keep],
         )
 
 

@@ -249,14 +249,11 @@ def snapshot_stem(step: int, steps: int) -> str:
     return f"step_{step:0{max(4, len(str(steps)))}d}"
 
 
-def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
-    """Report and snapshots of a finished run, in order of time.
+def read_report(path: Path | str) -> dict[str, Any]:
+    """The report of the finished run in a folder.
 
-    Raises AccessError where there is no such folder or report, CorruptError where the report is broken,
-    FormatError where the run wrote no PLY snapshots, and what `read_snapshot_ply` raises.
+    Raises AccessError where there is no such folder or report, CorruptError where the report is broken.
     """
-    from weathercoat.output.snapshots import read_snapshot_ply
-
     folder = Path(path)
     if not os.path.isdir(folder):  # noqa: PTH112 (any text will do)
         raise AccessError(
@@ -273,12 +270,32 @@ def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
         raise CorruptError("no valid JSON", file=str(folder / REPORT), remedy="run again") from error
     if not isinstance(report, dict):
         raise CorruptError("no JSON object", file=str(folder / REPORT), remedy="run again")
-    snapshots = [read_snapshot_ply(file) for file in sorted((folder / SNAPSHOTS).glob("*.ply"))]
-    if not snapshots:
+    return report
+
+
+def snapshot_files(path: Path | str) -> dict[int, Path]:
+    """The PLY snapshots of the finished run in a folder, by step, in order of time.
+
+    Raises FormatError where the run wrote none.
+    """
+    folder = Path(path)
+    files = {int(file.stem.rpartition("_")[2]): file for file in (folder / SNAPSHOTS).glob("step_*.ply")}
+    if not files:
         raise FormatError(
             "the run holds no PLY snapshots", file=str(folder), remedy="run again with PLY output"
         )
-    return report, sorted(snapshots, key=lambda snapshot: snapshot.step)
+    return dict(sorted(files.items()))
+
+
+def read_run(path: Path | str) -> tuple[dict[str, Any], list[Snapshot]]:
+    """Report and snapshots of a finished run, in order of time.
+
+    Raises what `read_report`, `snapshot_files` and `read_snapshot_ply` raise.
+    """
+    from weathercoat.output.snapshots import read_snapshot_ply
+
+    report = read_report(path)
+    return report, [read_snapshot_ply(file) for file in snapshot_files(path).values()]
 
 
 def _resolved(target: Path | str) -> Path:

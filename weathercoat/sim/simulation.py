@@ -191,6 +191,7 @@ class Simulation:
             dust=dust,
             bare=self.rust.film_corners == 0,
             substrate_color=stain_color(self.palette.metal, self.palette, metal_rust, dust),
+            surface=self.surface,
         )
 
     def _film_positions(self, used: Indices) -> Vectors:

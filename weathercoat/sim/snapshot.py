@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.mesh.surface import Indices, Surface, Vectors
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,9 @@ class Snapshot:
 
     Substrate, the mesh at the start: substrate_vertices, substrate_normals (outward, unit), substrate_faces;
     substrate_rust and dust (0 to 1), bare bool (all film gone from the vertex), substrate_color, per vertex.
+
+    surface: the mesh at the start with all that it has from the input (groups, texture coordinates, colours,
+    parts, places), in the substrate's order of vertices and faces; None where only geometry is known.
     """
 
     step: int
@@ -43,3 +46,4 @@ class Snapshot:
     dust: Vectors
     bare: NDArray[np.bool_]
     substrate_color: Vectors
+    surface: Surface | None = None
