@@ -194,7 +194,10 @@ def picture_parameters(config: Config) -> PictureParameters:
         paint=unit_color(colors.paint),
         primer=unit_color(colors.back),
         metal=unit_color(colors.metal),
+        rust_rim=unit_color(colors.young_rust),
         rust_body=unit_color(colors.rust),
+        rust_core=unit_color(colors.old_rust),
+        stain=unit_color(colors.stain),
         dust=unit_color(colors.dust),
     )
 

@@ -55,6 +55,16 @@ _AROUND = (
     "pictures",
     "check",
 )  # what is timed beside the steps
+# The key of the environment that each parameter is multiplied with.
+_FACTORS = {
+    "adhesion_decay_rate": "wear",
+    "cohesion_decay_rate": "wear",
+    "rust_source_rate": "corrosion",
+    "rust_lifted_rate": "corrosion",
+    "rust_bare_rate": "corrosion",
+    "rust_runoff_length": "rain",
+    "dust_rate": "dirt",
+}
 
 
 @dataclass(frozen=True)
@@ -346,9 +356,13 @@ def prepare_simulation(
 
 
 def fill(kind: type[_Parameters], config: Config) -> _Parameters:
-    """The parameters of a core room from the config: the field `adhesion_base` is the key `adhesion.base`."""
+    """The parameters of a core room from the config: the field `adhesion_base` is the key `adhesion.base`,
+    times what the environment makes of it.
+    """
     values = {}
     for parameter in fields(kind):
         section, _, key = parameter.name.partition("_")
-        values[parameter.name] = getattr(getattr(config, section), key)
+        value = getattr(getattr(config, section), key)
+        factor = _FACTORS.get(parameter.name)
+        values[parameter.name] = value if factor is None else value * getattr(config.environment, factor)
     return kind(**values)

@@ -17,6 +17,21 @@ from weathercoat.output.pictures import contact_sheet
 
 FOLDER = IMAGES / "gallery"
 PARTS = ("plate", "sign", "barrel", "gear", "sphere")
+# Shipped configs by what they are, with the parts to show them on. Environments are shown on one paint.
+LOOKS = ("standard", "crackle", "curling", "rusting", "literal")
+PAINTS = (
+    "new_car",
+    "chalked_alkyd",
+    "marine_epoxy",
+    "peeling_acrylic",
+    "galvanised",
+    "cast_iron",
+    "aluminium_filiform",
+    "powder_coat",
+)
+ENVIRONMENTS = ("c1", "c2", "c3", "c4", "c5")
+PARTS_OF_PAINTS = ("sign", "barrel")
+EXPOSED = ("chalked_alkyd", "sign")
 SETTINGS = (
     "snapshots.steps=[0, 200, 400, 600, 800, 1000]",
     "output.formats=ply",
@@ -31,17 +46,24 @@ def picture_name(config: str, part: str) -> str:
     return f"{config}_{part}.webp"
 
 
+def shown(config: str) -> list[tuple[str, str]]:
+    """What a config is shown by: the configs to run, `A+B` for an environment, each with the part."""
+    if config in ENVIRONMENTS:
+        paint, part = EXPOSED
+        return [(f"{paint}+{config}", part)]
+    return [(config, part) for part in (PARTS_OF_PAINTS if config in PAINTS else PARTS)]
+
+
 def draw_gallery(configs: Iterable[str] | None = None) -> None:
-    """Age every part by every shipped config, from intact to the end."""
+    """Age parts by every shipped config, from intact to the end."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         for part in PARTS:
             _call("sample", part, "-o", folder / f"{part}.obj")
-        for config in configs or preset_names():
-            for part in PARTS:
-                run = folder / f"{part}-{config}"
-                _call("run", config, folder / f"{part}.obj", "-o", run, *_assignments(SETTINGS), "--quiet")
-                save_picture(Image.open(run / "preview.png"), FOLDER / picture_name(config, part))
+        for config, part in (row for name in configs or preset_names() for row in shown(name)):
+            run = folder / f"{part}-{config}"
+            _call("run", config, folder / f"{part}.obj", "-o", run, *_assignments(SETTINGS), "--quiet")
+            save_picture(Image.open(run / "preview.png"), FOLDER / picture_name(config, part))
 
 
 def draw_comparison() -> None:

@@ -11,7 +11,7 @@ from making import accuracy, effects, fidelity, gallery, independence, noise, sp
 from making.places import DOCS, IMAGES
 from weathercoat import errors
 from weathercoat.config.describe import reference_markdown
-from weathercoat.config.presets import preset_names, preset_path, preset_purpose
+from weathercoat.config.presets import preset_path, preset_purpose
 from weathercoat.config.schema import parameters
 from weathercoat.notes import MEANINGS
 from weathercoat.scene.scene_file import scene_schema
@@ -49,6 +49,18 @@ Every shipped config on generated parts, intact and at the ages 0.2, 0.4, 0.6, 0
 $ weathercoat sample barrel -o barrel.obj
 $ weathercoat run rusting barrel.obj -o barrel --set 'snapshots.steps=[0, 200, 400, 600, 800, 1000]'
 ```
+
+There are [looks](#looks), [paints and metals](#paints-and-metals) and [environments](#environments). They go
+together: a later one wins where both set a key, and a config of your own comes last, here `mine.yaml`:
+
+```console
+$ weathercoat run marine_epoxy+c5 barrel.obj -o salty
+$ printf 'preset: [powder_coat, c4]\nappearance: {paint: "#2f6f4f"}\n' > mine.yaml
+$ weathercoat run mine.yaml barrel.obj -o green
+```
+
+All of them are looks: their numbers were chosen by eye, and none was measured on a paint. For values in MPa,
+µm and years see [physical units](physical.md).
 
 `python docs/make.py gallery` makes all of them. For `literal` beside `standard` see
 [the method](method.md#the-literal-rules-and-the-default-side-by-side).
@@ -176,15 +188,24 @@ def _signature(name: str, function: Callable[..., object]) -> str:
 
 
 def gallery_page() -> str:
-    """Every shipped config on every part, with the command that makes the picture."""
+    """Every shipped config on its parts, with the command that makes the picture."""
     lines = [_ABOUT_GALLERY.rstrip()]
-    for name in preset_names():
-        lines += ["", f"## {name}", "", f"{_about(name)}", ""]
-        lines += [f"[`configs/{name}.yaml`](../configs/{name}.yaml)", ""]
-        for part in gallery.PARTS:
-            link = _link(gallery.FOLDER, gallery.picture_name(name, part))
-            lines += [f"![{preset_purpose(name)}, on a {part}]({link})", ""]
-        lines.pop()
+    kinds = {
+        "Looks": gallery.LOOKS,
+        "Paints and metals": gallery.PAINTS,
+        "Environments": gallery.ENVIRONMENTS,
+    }
+    for title, names in kinds.items():
+        lines += ["", f"## {title}"]
+        for name in names:
+            lines += ["", f"### {name}", "", f"{_about(name)}", ""]
+            lines += [f"[`configs/{name}.yaml`](../configs/{name}.yaml)", ""]
+            for config, part in gallery.shown(name):
+                link = _link(gallery.FOLDER, gallery.picture_name(config, part))
+                paint, _, environment = config.partition("+")
+                with_paint = f", {paint}" if environment else ""
+                lines += [f"![{preset_purpose(name)}{with_paint}, on a {part}]({link})", ""]
+            lines.pop()
     return "\n".join(lines) + "\n"
 
 

@@ -72,7 +72,8 @@ def test_shipped_configs_say_what_they_are_for() -> None:
 
 
 def test_shipped_configs_differ() -> None:
-    configs = {name: load_config(name).config for name in preset_names()}
+    names = set(preset_names()) - {"c3"}  # which other environments are relative to
+    configs = {name: load_config(name).config for name in names}
     assert len({json.dumps(config.as_dict()) for config in configs.values()}) == len(configs)
 
 

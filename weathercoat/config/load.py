@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from weathercoat.config.derived import with_values
 from weathercoat.config.document import LARGEST_FILE, Item, read_document, read_value, without_lines
+from weathercoat.config.physical import NEEDED, physical_values
 from weathercoat.config.presets import preset_names, preset_path
 from weathercoat.config.quality import AUTO, point_of, with_point
 from weathercoat.config.schema import Config, parameters, section_at
@@ -72,7 +74,8 @@ class _Layer(NamedTuple):
 def load_config(
     path_or_preset: str | os.PathLike[str], overrides: Sequence[str | Override] = ()
 ) -> LoadedConfig:
-    """Load a YAML file or a shipped config by name; a regular file of that name comes first.
+    """Load a YAML file or a shipped config by name; a regular file of that name comes first. `A+B` is the
+    config B with the shipped config A before it, as if it were its preset; there may be more.
 
     overrides: `key.path=value` as given to `--set`, the value in YAML; later ones win. A quality has set what
     it sets, but for `auto`, which needs the model (see `weathercoat.plan`). Raises `ConfigError` with every
@@ -95,13 +98,15 @@ class ConfigLoader:
         """The config of a file or preset with overrides; see `load_config`."""
         source = os.fspath(path_or_preset)
         merge = _Merge()
-        layers = [self._file(source)]
+        *before, last = [source] if os.path.isfile(source) else source.split("+")  # noqa: PTH113 (any text)
+        layers = [self._file(last)]
         for override in overrides:
             try:
                 layers.append(_override_layer(override))
             except ConfigError as error:
                 merge.problems += error.problems
-        for name, origin in _wanted_presets(layers):
+        wanted = {name: _Origin(source, 0) for name in before} | _wanted_presets(layers)
+        for name, origin in wanted.items():
             preset = self._preset(name)
             if preset:
                 merge.add(preset)
@@ -115,13 +120,20 @@ class ConfigLoader:
         origins = {
             key: merge.origins.get(path, nowhere) for key, path in _resolved_keys(bool(config.remesh)).items()
         }
-        fixed = _fixed_keys(origins, layers)
+        fixed = _fixed_keys(origins, layers, ("quality",))
         loaded = LoadedConfig(
             config,
             {key: sys.intern(str(origin)) for key, origin in origins.items()},
             source,
             self._fixed.setdefault(fixed, fixed),
         )
+        physical = {
+            key: value
+            for key, value in physical_values(config.physical).items()
+            if key not in _fixed_keys(origins, layers, [f"physical.{name}" for name in NEEDED[key]])
+        }
+        if physical:
+            loaded = with_values(loaded, physical, "physical")
         if config.quality is None or config.quality == AUTO:
             return loaded
         return with_point(loaded, point_of(config.quality), f"quality {config.quality}")
@@ -143,15 +155,18 @@ class ConfigLoader:
         return self._presets.get(name)
 
 
-def _fixed_keys(origins: Mapping[str, _Origin], layers: Sequence[_Layer]) -> frozenset[str]:
-    """The keys whose values come from where `quality` comes from, or from what has more say."""
+def _fixed_keys(
+    origins: Mapping[str, _Origin], layers: Sequence[_Layer], by: Sequence[str]
+) -> frozenset[str]:
+    """The keys whose values come from where the last of the keys `by` comes from, or from what has more say."""
     say = {layers[0].where: 1, **{layer.where: 2 for layer in layers[1:]}}
 
     def say_of(key: str) -> int:
         where = origins[key].where
         return say.get(where, -1 if where == DEFAULT else 0)
 
-    return frozenset(key for key in origins if say_of(key) >= max(say_of("quality"), 0))
+    least = max(0, *map(say_of, by))
+    return frozenset(key for key in origins if say_of(key) >= least)
 
 
 @cache
@@ -222,7 +237,7 @@ def _override_layer(override: str | Override) -> _Layer:
     return _Layer(item.value, override.option, override.key)
 
 
-def _wanted_presets(layers: Iterable[_Layer]) -> list[tuple[str, _Origin]]:
+def _wanted_presets(layers: Iterable[_Layer]) -> dict[str, _Origin]:
     """The presets that the last layer with the key `preset` names; one that comes again comes only then."""
     wanted: dict[str, _Origin] = {}
     for layer in layers:
@@ -231,7 +246,7 @@ def _wanted_presets(layers: Iterable[_Layer]) -> list[tuple[str, _Origin]]:
             names = item.value if isinstance(item.value, list) else [item.value]
             last_first = dict.fromkeys(name for name in reversed(names) if isinstance(name, str))
             wanted = dict.fromkeys(reversed(last_first), _Origin(layer.where, item.line))
-    return list(wanted.items())
+    return wanted
 
 
 class _Merge:

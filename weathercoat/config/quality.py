@@ -11,12 +11,12 @@ import itertools
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from weathercoat.errors import ConfigError, ConfigProblem
+from weathercoat.config.derived import with_values
 
 if TYPE_CHECKING:
     from weathercoat.config.load import LoadedConfig
@@ -113,22 +113,10 @@ def with_point(loaded: LoadedConfig, point: Point, origin: str) -> LoadedConfig:
     Where remeshing is off the number of faces is not set. Raises ConfigError where the values do not go
     together with the rest.
     """
-    from weathercoat.config.schema import Config
-
-    config = loaded.config
-    values = {_FACES: point.faces(config.fracture.shear_lag), **point.values}
-    if not config.remesh:
+    values = {_FACES: point.faces(loaded.config.fracture.shear_lag), **point.values}
+    if not loaded.config.remesh:
         del values[_FACES]
-    values = {key: value for key, value in values.items() if key not in loaded.fixed}
-    content = config.as_dict()
-    for key, value in values.items():
-        section, _, name = key.partition(".")
-        content[section][name] = value
-    changed = Config.model_validate(content)
-    if problems := changed.conflicts():
-        raise ConfigError(problems=tuple(ConfigProblem(origin, 0, *problem) for problem in problems))
-    origins = {**loaded.origins, **dict.fromkeys(values, origin)}
-    return replace(loaded, config=changed, origins=origins)
+    return with_values(loaded, {k: v for k, v in values.items() if k not in loaded.fixed}, origin)
 
 
 def kept_keys(loaded: LoadedConfig, point: Point) -> dict[str, str]:

@@ -391,6 +391,43 @@ class Rust(Section):
     bare_rate: Real = parameter(3.0, "Rust of bare metal", unit="per age", ge=0, le=1e6)
 
 
+class Environment(Section):
+    """What surrounds the object, as factors on the rates that the paint has: 1 is open country or a town."""
+
+    wear: Real = parameter(
+        1.0, "Factor on how fast adhesion and cohesion are lost: light, heat and water", ge=0, le=1000
+    )
+    corrosion: Real = parameter(1.0, "Factor on how fast metal rusts, lifted or bare", ge=0, le=1000)
+    rain: Real = parameter(1.0, "Factor on how far rust runs", gt=0, le=1000)
+    dirt: Real = parameter(1.0, "Factor on how fast dust settles", ge=0, le=1000)
+
+
+class Physical(Section):
+    """The paint in physical units. What is given sets the keys that follow from it, by `config.physical`,
+    unless these are set beside it or after it.
+    """
+
+    years: PositiveOrNone = parameter(None, "Time that the run covers", unit="years")
+    lifetime: Real = parameter(
+        15.0, "Time that one age stands for, in which such a paint wears out", unit="years", gt=0, le=1e9
+    )
+    stress: PositiveOrNone = parameter(
+        None,
+        "Drying stress that the intact film tends to",
+        unit="MPa",
+        symbol="σ",  # noqa: RUF001
+    )
+    strength: PositiveOrNone = parameter(None, "Tensile strength of the film", unit="MPa")
+    adhesion: PositiveOrNone = parameter(None, "Pull-off strength on the metal at the start", unit="MPa")
+    thickness: PositiveOrNone = parameter(None, "Thickness of the film", unit="µm", symbol="d")
+    modulus: PositiveOrNone = parameter(None, "Young's modulus of the film", unit="GPa", symbol="E")
+    poisson: Real = parameter(0.35, "Poisson's ratio of the film", symbol="ν", ge=0, lt=0.5)  # noqa: RUF001
+    skin: Real = parameter(
+        0.3, "Share of the thickness, on the outside, whose shrinking curls the rest", symbol="s", gt=0, lt=1
+    )
+    size: PositiveOrNone = parameter(None, "Length of a size: the root of the painted area", unit="m")
+
+
 class Appearance(Section):
     """Colours (sRGB) and the drawn thickness of the film."""
 
@@ -398,6 +435,9 @@ class Appearance(Section):
     back: Color = parameter((188, 178, 160), "Inner side of the film, the primer")
     metal: Color = parameter((122, 124, 126), "Metal without rust")
     rust: Color = parameter((132, 51, 0), "Rust")
+    young_rust: Color = parameter((163, 99, 51), "Rust at the rim of its patches, in pictures")
+    old_rust: Color = parameter((51, 26, 15), "Rust in the core of its patches, in pictures")
+    stain: Color = parameter((128, 64, 23), "Rust that has run over the film, in pictures")
     dust: Color = parameter((172, 156, 130), "Dust")
     thickness: Real = parameter(
         0.003, "Thickness of the film in meshes and pictures", unit="sizes", ge=0, le=0.1
@@ -503,6 +543,8 @@ class Config(Section):
     deformation: Deformation = Deformation()
     dust: Dust = Dust()
     rust: Rust = Rust()
+    environment: Environment = Environment()
+    physical: Physical = Physical()
     appearance: Appearance = Appearance()
     snapshots: Snapshots = Snapshots()
     checkpoint: Checkpoint = Checkpoint()
@@ -510,6 +552,8 @@ class Config(Section):
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Values that are valid each but do not go together: (key, what is wrong)."""
+        from weathercoat.config.physical import unused_values
+
         found = []
         if self.tension.law == "saturating" and self.tension.initial > 1:
             found.append(("tension.initial", "must be at most 1, the cap of the saturating law"))
@@ -519,6 +563,7 @@ class Config(Section):
         scene = self.scene
         if scene.pixels_per_metre is not None and (scene.distance or scene.nearest):
             found.append(("scene.pixels_per_metre", "give it or the distance of a camera, not both"))
+        found += unused_values(self.physical)
         if self.quality == "auto" and scene.pixels_per_unit() is None:
             found.append(("quality", "auto needs scene.distance, scene.nearest or scene.pixels_per_metre"))
         return found

@@ -9,6 +9,7 @@ from typing import Any
 
 from weathercoat.batch.batch import Listener, run_batch
 from weathercoat.batch.job import Executor, Job, Task
+from weathercoat.config.derived import with_values
 from weathercoat.mesh.surface import Surface
 from weathercoat.output.folder import SNAPSHOTS, output_errors, snapshot_stem
 from weathercoat.output.meshes import write_mesh
@@ -18,7 +19,6 @@ from weathercoat.recording import unit_color
 from weathercoat.scene.graph import AgedMesh
 from weathercoat.scene.plan import MODELS, ScenePlan, VariantPlan
 from weathercoat.scene.report import REPORT, job_name, make_report
-from weathercoat.scene.weathering import with_values
 from weathercoat.scene.write import write_scene
 
 SCENE, PREVIEW = "scene.glb", "preview.png"

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from weathercoat.config.derived import with_values
 from weathercoat.config.load import LoadedConfig, Override, load_config
 from weathercoat.config.quality import AUTO
 from weathercoat.cost import Cost, estimate_cost
@@ -20,7 +21,7 @@ from weathercoat.scene.detail import UNSEEN, nearest_distances
 from weathercoat.scene.exposure import measure_exposure
 from weathercoat.scene.graph import Rule, Scene, SceneObject, place
 from weathercoat.scene.groups import Member, Variant, group_members, placement_of
-from weathercoat.scene.weathering import SPLASH_HEIGHT, Weathering, weather, weathered_config, with_values
+from weathercoat.scene.weathering import SPLASH_HEIGHT, Weathering, weather, weathered_config
 
 _CAMERA = "the scene's camera"
 # What a scene needs of each run: the last film as PLY. A config that asks for more gets it.

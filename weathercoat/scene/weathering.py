@@ -12,17 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
+from weathercoat.config.derived import with_values
 from weathercoat.config.load import LoadedConfig
-from weathercoat.config.schema import Config
-from weathercoat.config.wording import explain
-from weathercoat.errors import ConfigError, ConfigProblem
 from weathercoat.mesh.surface import Vectors
 from weathercoat.scene.exposure import CALM_SHARE, RAIN_SLOPE, Exposure
 
@@ -147,27 +144,6 @@ def weathered_config(
     if config.snapshots.steps:
         values["snapshots.steps"] = _scaled(config.snapshots.steps, steps / config.ageing.steps)
     return with_values(loaded, values, "the scene")
-
-
-def with_values(loaded: LoadedConfig, values: _Values, origin: str) -> LoadedConfig:
-    """A config with other values, by dotted keys; origin: where they come from.
-
-    Raises ConfigError for values out of bounds.
-    """
-    content = loaded.config.as_dict()
-    for key, value in values.items():
-        section, _, name = key.partition(".")
-        if name:
-            content[section][name] = value
-        else:
-            content[section] = value
-    try:
-        config = Config.model_validate(content)
-    except ValidationError as error:
-        found = [explain(detail) for detail in error.errors(include_url=False)]
-        problems = (ConfigProblem(origin, 0, ".".join(path), what) for path, what in found)
-        raise ConfigError(problems=tuple(problems)) from None
-    return replace(loaded, config=config, origins={**loaded.origins, **dict.fromkeys(values, origin)})
 
 
 def _degree(wear: float) -> float:
