@@ -158,7 +158,9 @@ class ConfigLoader:
 def _fixed_keys(
     origins: Mapping[str, _Origin], layers: Sequence[_Layer], by: Sequence[str]
 ) -> frozenset[str]:
-    """The keys whose values come from where the last of the keys `by` comes from, or from what has more say."""
+    """The keys whose values come from where the last of the keys `by` comes from, or from what has more
+    say.
+    """
     say = {layers[0].where: 1, **{layer.where: 2 for layer in layers[1:]}}
 
     def say_of(key: str) -> int:
