@@ -55,7 +55,7 @@ together: a later one wins where both set a key, and a config of your own comes 
 
 ```console
 $ weathercoat run marine_epoxy+c5 barrel.obj -o salty
-$ printf 'preset: [powder_coat, c4]\nappearance: {paint: "#2f6f4f"}\n' > mine.yaml
+$ printf 'preset: [powder_coat, c4]\\nappearance: {paint: "#2f6f4f"}\\n' > mine.yaml
 $ weathercoat run mine.yaml barrel.obj -o green
 ```
 
