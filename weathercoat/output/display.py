@@ -5,15 +5,18 @@ object's size.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
-from weathercoat.output.shading import BACK, BARE_PART, FRONT, METAL, RIM
-from weathercoat.output.shell import corner_normals, make_shell, open_edges, smooth_outline
+from weathercoat.output.materials import Material, face_materials, film_materials, read_material
+from weathercoat.output.shading import BACK, BARE_PART, FRONT, METAL, OWN_PART, RIM, to_linear
+from weathercoat.output.shell import Shell, corner_normals, make_shell, open_edges, smooth_outline
 from weathercoat.sim.snapshot import Snapshot
 
 _GAP = 0.25  # of the film's thickness: it floats this far above the metal, so that no two surfaces coincide
@@ -53,7 +56,9 @@ class DisplayMesh:
 
     vertices (k, 3); faces int32 (t, 3); kind uint8 (t,), see `shading`; corner_normals float32 (t, 3, 3).
     rest (k, 3), the position at rest; stain, dust, rust (k,), 0 to 1: runoff rust on the film, dust, rust of
-    the metal; layer (k,), 1 on the film's front and 0 on its back; color (k, 3), linear colour of the paint.
+    the metal; layer (k,), 1 on the film's front and 0 on its back; color (k, 3), linear colour of the paint
+    or, under a material, what multiplies its colour. material int32 (t,): what a face shows of `materials`,
+    -1 for none; uv float32 (t, 3, 2), texture coordinates of the corners, v upwards.
     """
 
     vertices: Vectors
@@ -66,13 +71,29 @@ class DisplayMesh:
     rust: Vectors
     layer: Vectors
     color: Vectors
+    material: Indices
+    uv: NDArray[np.float32]
+    materials: tuple[Material, ...] = ()
 
     def at(self, face: Indices, weights: NDArray[np.float32]) -> Samples:
         """The points on `face` (s,) with `weights` (s, 2) of its second and third corner."""
+        count = len(face)
+        vector, scalar = (partial(np.empty, shape) for shape in ((count, 3), count))
         samples = Samples(
             self.kind[face],
-            *(np.empty((len(face), 3)) for _ in range(5)),
-            *(np.empty(len(face)) for _ in range(4)),
+            position=vector(),
+            facet=vector(),
+            normal=vector(),
+            rest=vector(),
+            color=vector(),
+            stain=scalar(),
+            dust=scalar(),
+            rust=scalar(),
+            layer=scalar(),
+            is_own=self.material[face] >= 0,
+            roughness=np.ones(count),
+            metallic=np.zeros(count),
+            occlusion=np.ones(count),
         )
         vectors = np.stack([self.vertices, self.rest, self.color], axis=1)
         scalars = np.stack([self.stain, self.dust, self.rust, self.layer], axis=1)
@@ -98,7 +119,11 @@ class DisplayMesh:
 
 @dataclass(frozen=True)
 class Samples:
-    """Points of a display mesh: kind (s,), vectors (s, 3), scalars (s,); `facet` is the face normal."""
+    """Points of a display mesh: kind (s,), vectors (s, 3), scalars (s,); `facet` is the face normal.
+
+    is_own (s,): whether the colour is that of a material of the input; roughness, metallic, occlusion: of
+    parts that show one.
+    """
 
     kind: NDArray[np.uint8]
     position: Vectors
@@ -110,6 +135,10 @@ class Samples:
     dust: Vectors
     rust: Vectors
     layer: Vectors
+    is_own: NDArray[np.bool_]
+    roughness: Vectors
+    metallic: Vectors
+    occlusion: Vectors
 
 
 def make_display_mesh(
@@ -120,14 +149,19 @@ def make_display_mesh(
     metal_thickness: float,
     paint: Vectors,
     untouched: Surface | None = None,
+    look: str = "paint",
 ) -> DisplayMesh:
-    """The display mesh of a snapshot; thicknesses are in sizes, `paint` (3,) is the film's linear colour."""
+    """The display mesh of a snapshot; thicknesses are in sizes, `paint` (3,) is the film's linear colour,
+    which it has where it does not show a material of the input, see `materials.film_materials` on `look`.
+
+    Raises CorruptError where a texture cannot be decoded.
+    """
     rest = normalise(snapshot.substrate_vertices)
     parts = [_metal(snapshot, rest, metal_thickness)]
     if len(snapshot.film_faces):
-        parts.append(_film(snapshot, normalise(snapshot.film_vertices), rest, film_thickness, paint))
+        parts.append(_film(snapshot, normalise(snapshot.film_vertices), rest, film_thickness, paint, look))
     if untouched is not None and len(untouched.faces):
-        parts.append(make_bare_mesh(normalise(untouched.vertices), untouched.faces))
+        parts.append(make_part_mesh(normalise(untouched.vertices), untouched))
     return join_meshes(parts)
 
 
@@ -142,9 +176,10 @@ def _part(
     """
     given = scalars or {}
     zero = np.zeros(len(vertices))
+    everything = np.concatenate([faces for faces, _ in surfaces]).astype(np.int32, copy=False)
     return DisplayMesh(
         vertices=vertices,
-        faces=np.concatenate([faces for faces, _ in surfaces]).astype(np.int32, copy=False),
+        faces=everything,
         kind=np.concatenate([np.full(len(faces), kind, np.uint8) for faces, kind in surfaces]),
         corner_normals=np.concatenate([corner_normals(vertices, faces, crease) for faces, _ in surfaces]),
         rest=given.get("rest", vertices),
@@ -153,6 +188,8 @@ def _part(
         rust=given.get("rust", zero),
         layer=given.get("layer", zero),
         color=given.get("color", np.zeros((len(vertices), 3))),
+        material=np.full(len(everything), -1, np.int32),
+        uv=np.zeros((len(everything), 3, 2), np.float32),
     )
 
 
@@ -170,7 +207,7 @@ def _metal(snapshot: Snapshot, rest: Vectors, thickness: float) -> DisplayMesh:
 
 
 def _film(
-    snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors
+    snapshot: Snapshot, vertices: Vectors, rest: Vectors, thickness: float, paint: Vectors, look: str
 ) -> DisplayMesh:
     """Front, back and rim of the film."""
     thickness = max(thickness, _LEAST_THICKNESS)
@@ -191,7 +228,97 @@ def _film(
         "color": np.tile(color, (2, 1)),
     }
     surfaces = ((shell.front, FRONT), (shell.back, BACK), (shell.rim, RIM))
-    return _part(shell.vertices, surfaces, _FILM_CREASE, scalars)
+    film = _part(shell.vertices, surfaces, _FILM_CREASE, scalars)
+    return _with_look(film, snapshot, shell, look)
+
+
+def _with_look(film: DisplayMesh, snapshot: Snapshot, shell: Shell, look: str) -> DisplayMesh:
+    """The film with the input's own materials where `look` wants them: on its front and its rim."""
+    surface = snapshot.surface
+    if surface is None:
+        return film
+    shown = film_materials(surface, look)[snapshot.film_face]
+    if (shown < 0).all():
+        return film
+    fronts, owner = len(shell.front), shell.rim_face
+    everywhere = np.full(len(film.faces), -1, np.int32)
+    everywhere[:fronts] = shown
+    everywhere[2 * fronts :] = shown[owner]
+    uv = film.uv.copy()
+    if surface.uv is not None:
+        uv[:fronts] = surface.uv[snapshot.film_face]
+        # a corner of the rim has the texture of the front's corner at the same vertex
+        at = shell.rim % np.int32(len(snapshot.film_vertices))
+        corner = (shell.front[owner][:, None, :] == at[:, :, None]).argmax(axis=2)
+        uv[2 * fronts :] = uv[owner[:, None], corner]
+    number, materials = _decoded(surface, everywhere, only_color=True)
+    colors = _vertex_colors(surface)[np.tile(snapshot.film_origin, 2)]
+    return replace(_recolored(film, number >= 0, colors), uv=uv, material=number, materials=materials)
+
+
+def _recolored(mesh: DisplayMesh, chosen: NDArray[np.bool_], colors: Vectors) -> DisplayMesh:
+    """The mesh with `colors` (k, 3) on the `chosen` faces (t,), which get vertices of their own."""
+    used, renumbered = np.unique(mesh.faces[chosen], return_inverse=True)
+    faces = mesh.faces.copy()
+    faces[chosen] = (len(mesh.vertices) + renumbered).reshape(-1, 3)
+    names = ("vertices", "rest", "stain", "dust", "rust", "layer")
+    longer: dict[str, Any] = {
+        name: np.concatenate([getattr(mesh, name), getattr(mesh, name)[used]]) for name in names
+    }
+    return replace(mesh, faces=faces, color=np.concatenate([mesh.color, colors[used]]), **longer)
+
+
+def _decoded(
+    surface: Surface, material: Indices, *, only_color: bool = False
+) -> tuple[Indices, tuple[Material, ...]]:
+    """The materials that are used of a surface's, decoded, and their numbers for those of `material` (t,)."""
+    used = np.unique(material[material >= 0])
+    number = np.where(material >= 0, np.searchsorted(used, material), -1).astype(np.int32)
+    read = (read_material(surface.materials[i], only_color=only_color) for i in used)
+    return number, tuple(each if surface.uv is not None else each.without_textures() for each in read)
+
+
+def _vertex_colors(surface: Surface) -> Vectors:
+    """What multiplies the materials' colour at each vertex, (n, 3), linear."""
+    if surface.colors is None:
+        return np.ones((len(surface.vertices), 3))
+    return to_linear(surface.colors[:, :3])
+
+
+def make_part_mesh(vertices: Vectors, surface: Surface) -> DisplayMesh:
+    """The display mesh of a surface that carries no paint, with its vertices at `vertices` (k, 3): in its own
+    materials and vertex colours, or in the colour of unpainted parts where it has none.
+
+    Raises CorruptError where a texture cannot be decoded.
+    """
+    material, materials = _decoded(surface, face_materials(surface))
+    if surface.colors is not None and len(materials) == 0:
+        material, materials = np.zeros_like(material), (Material(roughness=0.6, metallic=0.0),)
+    bare, own = surface.faces[material < 0], surface.faces[material >= 0]
+    mesh = _part(
+        vertices,
+        ((bare, BARE_PART), (own, OWN_PART)),
+        _METAL_CREASE,
+        {"color": _vertex_colors(surface)},
+    )
+    order = np.argsort(material >= 0, kind="stable")
+    uv = mesh.uv if surface.uv is None else surface.uv[order].astype(np.float32)
+    normals = mesh.corner_normals if surface.normals is None else surface.normals[order].astype(np.float32)
+    return replace(
+        mesh,
+        material=np.ascontiguousarray(material[order], np.int32),
+        materials=materials,
+        uv=uv,
+        corner_normals=normals,
+    )
+
+
+def make_textured_mesh(vertices: Vectors, surface: Surface, material: Material) -> DisplayMesh:
+    """The display mesh of a surface with texture coordinates, all of it in one material, such as one of
+    `materials.make_material`; its vertices lie at `vertices` (k, 3), and it keeps its smooth normals.
+    """
+    plain = replace(surface, parts=(), materials=(), colors=np.ones((len(surface.vertices), 4)))
+    return replace(make_part_mesh(vertices, plain), materials=(material,))
 
 
 def make_bare_mesh(vertices: Vectors, faces: Indices) -> DisplayMesh:
@@ -215,8 +342,18 @@ def join_meshes(parts: Sequence[DisplayMesh]) -> DisplayMesh:
     def all_of(name: str) -> NDArray[np.generic]:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    names = ("vertices", "kind", "corner_normals", "rest", "stain", "dust", "rust", "layer", "color")
-    return DisplayMesh(faces=np.concatenate(faces), **{name: all_of(name) for name in names})  # type: ignore[arg-type]
+    names = ("vertices", "kind", "corner_normals", "rest", "stain", "dust", "rust", "layer", "color", "uv")
+    starts = np.cumsum([0] + [len(part.materials) for part in parts])
+    material = [
+        np.where(part.material >= 0, part.material + np.int32(start), part.material)
+        for part, start in zip(parts, starts, strict=False)
+    ]
+    return DisplayMesh(
+        faces=np.concatenate(faces),
+        material=np.concatenate(material),
+        materials=tuple(material for part in parts for material in part.materials),
+        **{name: all_of(name) for name in names},  # type: ignore[arg-type]
+    )
 
 
 @kernel

@@ -20,6 +20,7 @@ from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
 from weathercoat.output.ground import ground_shadow
 from weathercoat.output.lighting import filter_light, gather_light, share_samples
+from weathercoat.output.materials import apply_materials
 from weathercoat.output.rays import RayQueries, make_rays
 from weathercoat.output.shading import (
     DUST,
@@ -53,6 +54,8 @@ class PictureParameters:
     half the picture that stays free on each side. samples: side of the square of samples in each pixel;
     sky_rays, key_rays: rays for each sample towards the sky and the key light; reach: distance within which
     things block the sky. Colours are those of clean materials: the stains come from the snapshot's scalars.
+    look: where the film shows the materials of the input: auto, model or paint, see
+    `materials.film_materials`.
     """
 
     width: int = 520
@@ -76,6 +79,7 @@ class PictureParameters:
     stain: Color = (0.50, 0.25, 0.09)
     dust: Color = (0.50, 0.46, 0.40)
     unpainted: Color = (0.20, 0.20, 0.21)
+    look: str = "auto"
 
 
 _KEY = 2.75 * np.array([1.0, 0.95, 0.87])
@@ -131,6 +135,7 @@ def render_snapshot(
         metal_thickness=parameters.metal_thickness,
         paint=to_linear(parameters.paint),
         untouched=untouched,
+        look=parameters.look,
     )
     placed = normalise(snapshot.substrate_vertices)
     level = float((placed @ np.asarray(up, np.float64)).min()) - parameters.metal_thickness
@@ -159,7 +164,7 @@ def render_mesh(
     upward = np.asarray(up, np.float64)
     key = _key_direction(camera, upward)
     light = _Light(key, upward, parameters)
-    color = _shaded(rays, mesh, face[seen], weights[seen], seen, (height, width), camera.position, light)
+    color = _shaded(rays, mesh, face[seen], weights[seen], seen, (height, width), camera, light)
     picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
     coverage = _pixel_means((face >= 0).astype(np.float32).reshape(height, width, 1), factor)
@@ -221,7 +226,7 @@ def _shaded(
     weights: NDArray[np.float32],
     seen: NDArray[np.int64],
     shape: tuple[int, int],
-    eye: Vectors,
+    camera: Camera,
     light: _Light,
 ) -> NDArray[np.float32]:
     """Tone-mapped linear colours (s, 3) of the points on `face`, at `seen` in a picture of `shape`."""
@@ -235,6 +240,7 @@ def _shaded(
     leaders, follows = np.flatnonzero(is_leader), (np.cumsum(is_leader) - 1)[leader]
     number.ravel()[seen] = follows
     s = mesh.at(face[leaders], weights[leaders])
+    apply_materials(mesh, face, weights, follows, camera, shape, s)
     row, column = (seen[leaders] // width).astype(np.int32), (seen[leaders] % width).astype(np.int32)
     lit, sky = gather_light(
         rays,
@@ -255,8 +261,9 @@ def _shaded(
     )
     color = np.empty((len(leaders), 3), np.float32)
     shade(
-        s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, eye,
-        light.key, _KEY, light.up, _palette(parameters), smooth_lit, smooth_sky, color,
+        s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, s.is_own,
+        s.roughness, s.metallic, s.occlusion, camera.position, light.key, _KEY, light.up,
+        _palette(parameters), smooth_lit, smooth_sky, color,
     )  # fmt: skip
     return color[follows]
 

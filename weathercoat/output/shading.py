@@ -15,7 +15,7 @@ from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Vectors
 
 # What a face shows.
-FRONT, BACK, RIM, METAL, BARE_PART = range(5)
+FRONT, BACK, RIM, METAL, BARE_PART, OWN_PART = range(6)
 # Rows of the palette: colours, but for the optical depth of a full stain in red, green and blue.
 PRIMER, STEEL, RUST_RIM, RUST_BODY, RUST_CORE, STAIN, STAIN_DEPTH, DUST, UNPAINTED = range(9)
 
@@ -174,17 +174,22 @@ def _film_color(
     up: Vectors,
     stain: float,
     dust: float,
+    is_own: bool,
     palette: Vectors,
     albedo: Vectors,
     bump: Vectors,
     slope: Vectors,
     scratch: Vectors,
 ) -> tuple[float, float]:
-    """Paint with runoff rust and dust over it, to `albedo`; returns its roughness and its gloss (0 to 1)."""
+    """Paint with runoff rust and dust over it, to `albedo`; returns its roughness and its gloss (0 to 1).
+
+    Paint of one colour is given some life, but one that shows a picture of its own (`is_own`).
+    """
     x, y, z = rest[0], rest[1], rest[2]
     cloud = fractal_noise(x, y, z, 6.0, 5, slope, scratch)
-    for c in range(3):
-        albedo[c] *= 0.84 + 0.32 * cloud
+    if not is_own:
+        for c in range(3):
+            albedo[c] *= 0.84 + 0.32 * cloud
     gradient_noise(x * 95.0, y * 95.0, z * 95.0, slope)
     for axis in range(3):
         bump[axis] += 0.028 * slope[axis]
@@ -267,6 +272,10 @@ def shade(
     rust: Vectors,
     layer: Vectors,
     color: Vectors,
+    is_own: NDArray[np.bool_],
+    own_roughness: Vectors,
+    own_metallic: Vectors,
+    occlusion: Vectors,
     eye: Vectors,
     key: Vectors,
     key_color: Vectors,
@@ -278,9 +287,11 @@ def shade(
 ) -> None:
     """Tone-mapped linear colour of s samples, to `out` float32 (s, 3).
 
-    kind (s,): FRONT, BACK, RIM, METAL or BARE_PART; position, normal, rest (s, 3); stain, dust, rust, layer
-    (s,), the last the place between the back (0) and the front (1) of the rim; color (s, 3) linear paint; key
-    (3,) towards the key light; lit (s,) its visible share; sky_light (s, 3) mean radiance over the
+    kind (s,), as named above; position, normal, rest (s, 3); stain, dust, rust, layer (s,), the last the
+    place between the back (0) and the front (1) of the rim; color (s, 3), linear, of the paint or of parts
+    that show their own; is_own (s,), whether it is from a material of the input; own_roughness, own_metallic,
+    occlusion (s,), of such parts; key (3,) towards the key light; lit (s,) its visible share; sky_light
+    (s, 3) mean radiance over the
     cosine-weighted hemisphere. palette (9, 3), linear, by the rows named above.
     """
     albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -292,7 +303,7 @@ def shade(
         if k == FRONT or (k == RIM and layer[i] > 0.6):
             _copy(color[i], albedo)
             roughness, gloss = _film_color(
-                rest[i], up, stain[i], dust[i], palette, albedo, bump, slope, scratch
+                rest[i], up, stain[i], dust[i], is_own[i], palette, albedo, bump, slope, scratch
             )
         elif k in (BACK, RIM):
             _copy(palette[PRIMER], albedo)
@@ -319,6 +330,9 @@ def shade(
             veil = 0.5 * (1.0 - np.exp(-1.4 * dust[i]))
             _blend(albedo, palette[DUST], veil)
             metallic *= 1.0 - veil
+        elif k == OWN_PART:
+            _copy(color[i], albedo)
+            roughness, metallic = own_roughness[i], own_metallic[i]
         else:
             _copy(palette[UNPAINTED], albedo)
             roughness = 0.5
@@ -356,9 +370,11 @@ def shade(
             light = (
                 albedo[c]
                 * (1.0 - metallic)
-                * (max(nl, 0.0) * lit[i] * key_color[c] / np.pi + sky_light[i, c])
+                * (max(nl, 0.0) * lit[i] * key_color[c] / np.pi + occlusion[i] * sky_light[i, c])
             )
-            light += tint * specular * lit[i] * key_color[c] + 0.8 * fresnel * env[c] * min(1.0, openness)
+            light += tint * specular * lit[i] * key_color[c] + 0.8 * fresnel * env[c] * min(
+                1.0, openness * occlusion[i]
+            )
             out[i, c] = tone(light)
 
 

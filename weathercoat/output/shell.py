@@ -17,13 +17,14 @@ class Shell:
 
     vertices: float64 (2 n, 3), first the n vertices of the front, then those of the back, in the sheet's
     order. front, back: int32 (m, 3), counter-clockwise seen from outside of the shell. rim: int32 (2 b, 3),
-    two faces for each of the b open edges.
+    two faces for each of the b open edges; rim_face: int32 (2 b,), the face of the sheet beside each.
     """
 
     vertices: Vectors
     front: Indices
     back: Indices
     rim: Indices
+    rim_face: Indices
 
 
 def make_shell(
@@ -47,7 +48,13 @@ def make_shell(
     rim = np.empty((2 * len(tails), 3), np.int32)
     rim[0::2] = np.stack([heads, tails, tails + count], axis=1)
     rim[1::2] = np.stack([heads, tails + count, heads + count], axis=1)
-    return Shell(np.concatenate([front, back]), faces, faces[:, ::-1] + np.int32(count), rim)
+    return Shell(
+        np.concatenate([front, back]),
+        faces,
+        faces[:, ::-1] + np.int32(count),
+        rim,
+        np.repeat(owners, 2),
+    )
 
 
 def open_edges(faces: Indices) -> tuple[Indices, Indices, Indices]:
