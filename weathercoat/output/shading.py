@@ -262,6 +262,67 @@ def add_sky(directions: NDArray[np.float32], blocked: NDArray[np.bool_], up: Vec
 
 
 @kernel
+def material_of(
+    k: int,
+    rest: Vectors,
+    up: Vectors,
+    stain: float,
+    dust: float,
+    rust: float,
+    layer: float,
+    color: Vectors,
+    is_own: bool,
+    own_roughness: float,
+    own_metallic: float,
+    palette: Vectors,
+    albedo: Vectors,
+    bump: Vectors,
+    slope: Vectors,
+    scratch: Vectors,
+) -> tuple[float, float, float]:
+    """What one point of the kind k is made of: its linear colour goes to `albedo` (3,), the gradient of its
+    bumps to `bump` (3,); returns roughness, gloss and metalness. Arguments as of `shade`, for one point.
+    """
+    bump[0] = bump[1] = bump[2] = 0.0
+    roughness, gloss, metallic = 0.6, 1.0, 0.0
+    if k == FRONT or (k == RIM and layer > 0.6):
+        _copy(color, albedo)
+        roughness, gloss = _film_color(rest, up, stain, dust, is_own, palette, albedo, bump, slope, scratch)
+    elif k in (BACK, RIM):
+        _copy(palette[PRIMER], albedo)
+        value = fractal_noise(rest[0], rest[1], rest[2], 30.0, 3, slope, scratch)
+        for c in range(3):
+            albedo[c] *= 0.82 + 0.3 * value
+        if k == RIM:
+            # A broken edge is fresh in places and holds grime in others.
+            _blend(albedo, palette[DUST], 0.75 * _smooth_step(0.38, 0.6, value))
+            for c in range(3):
+                albedo[c] *= 0.8
+        # Rust of the metal clings to the back of the film and bleeds out under its edge.
+        cover = _rust_layer(rest, 0.6 * rust, palette, albedo, bump, slope, scratch)
+        roughness, gloss = 0.8, 0.5 * (1.0 - cover)
+    elif k == METAL:
+        _copy(palette[STEEL], albedo)
+        scale = fractal_noise(rest[0], rest[1], rest[2], 14.0, 4, slope, scratch)
+        for c in range(3):
+            albedo[c] *= 0.75 + 0.5 * scale
+        cover = _rust_layer(rest, rust, palette, albedo, bump, slope, scratch)
+        metallic = 0.75 * (1.0 - cover)
+        roughness = 0.42 + 0.2 * scale + 0.45 * cover
+        gloss = 1.0 - 0.6 * cover
+        veil = 0.5 * (1.0 - np.exp(-1.4 * dust))
+        _blend(albedo, palette[DUST], veil)
+        metallic *= 1.0 - veil
+    elif k == OWN_PART:
+        _copy(color, albedo)
+        roughness, metallic = own_roughness, own_metallic
+    else:
+        _copy(palette[UNPAINTED], albedo)
+        roughness = 0.5
+    return roughness, gloss, metallic
+
+
+@kernel
 def shade(
     kind: NDArray[np.uint8],
     position: Vectors,
@@ -296,46 +357,12 @@ def shade(
     """
     albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     n, view, env = np.empty(3), np.empty(3), np.empty(3)
+    f0 = 0.04
     for i in range(len(kind)):
-        k = kind[i]
-        bump[0] = bump[1] = bump[2] = 0.0
-        f0, roughness, gloss, metallic = 0.04, 0.6, 1.0, 0.0
-        if k == FRONT or (k == RIM and layer[i] > 0.6):
-            _copy(color[i], albedo)
-            roughness, gloss = _film_color(
-                rest[i], up, stain[i], dust[i], is_own[i], palette, albedo, bump, slope, scratch
-            )
-        elif k in (BACK, RIM):
-            _copy(palette[PRIMER], albedo)
-            value = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 30.0, 3, slope, scratch)
-            for c in range(3):
-                albedo[c] *= 0.82 + 0.3 * value
-            if k == RIM:
-                # A broken edge is fresh in places and holds grime in others.
-                _blend(albedo, palette[DUST], 0.75 * _smooth_step(0.38, 0.6, value))
-                for c in range(3):
-                    albedo[c] *= 0.8
-            # Rust of the metal clings to the back of the film and bleeds out under its edge.
-            cover = _rust_layer(rest[i], 0.6 * rust[i], palette, albedo, bump, slope, scratch)
-            roughness, gloss = 0.8, 0.5 * (1.0 - cover)
-        elif k == METAL:
-            _copy(palette[STEEL], albedo)
-            scale = fractal_noise(rest[i, 0], rest[i, 1], rest[i, 2], 14.0, 4, slope, scratch)
-            for c in range(3):
-                albedo[c] *= 0.75 + 0.5 * scale
-            cover = _rust_layer(rest[i], rust[i], palette, albedo, bump, slope, scratch)
-            metallic = 0.75 * (1.0 - cover)
-            roughness = 0.42 + 0.2 * scale + 0.45 * cover
-            gloss = 1.0 - 0.6 * cover
-            veil = 0.5 * (1.0 - np.exp(-1.4 * dust[i]))
-            _blend(albedo, palette[DUST], veil)
-            metallic *= 1.0 - veil
-        elif k == OWN_PART:
-            _copy(color[i], albedo)
-            roughness, metallic = own_roughness[i], own_metallic[i]
-        else:
-            _copy(palette[UNPAINTED], albedo)
-            roughness = 0.5
+        roughness, gloss, metallic = material_of(
+            kind[i], rest[i], up, stain[i], dust[i], rust[i], layer[i], color[i], is_own[i],
+            own_roughness[i], own_metallic[i], palette, albedo, bump, slope, scratch,
+        )  # fmt: skip
         distance = 0.0
         for c in range(3):
             view[c] = eye[c] - position[i, c]
