@@ -87,6 +87,10 @@ _TEXTS: dict[str, tuple[str, str]] = {
         "Look whether a name is misspelt.",
     ),
     "W-UNREFERENCED": ("Vertices that no face uses were dropped.", "Nothing."),
+    "W-COLORS": (
+        "Vertices at one place have different colours, of which one was kept.",
+        "Nothing, or give the parts that have them different materials.",
+    ),
     "W-WELDED": ("Vertices at the same position were merged.", "Nothing."),
 }
 

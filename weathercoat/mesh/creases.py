@@ -52,11 +52,13 @@ def find_features(
     face_group: Indices,
     crease_angle: float,
     edge_length: float,
+    seams: NDArray[np.bool_] | None = None,
 ) -> Features:
     """The features of a manifold mesh, vertices (n, 3), faces (m, 3), for new edges of length `edge_length`.
 
     Creases bend by more than `crease_angle` [rad]; boundaries and borders of `face_group` (m,) are kept
-    always.
+    always. Seams of texture coordinates (3 m,) are kept like creases: but for short and dense ones, as
+    between the many small charts of an automatic atlas, whose lines would leave no room for even triangles.
     """
     tail = faces.reshape(-1)
     head = np.roll(faces, -1, axis=1).reshape(-1)
@@ -72,6 +74,10 @@ def find_features(
     bent = inner & has_normal & (cosine < np.cos(crease_angle)) & ~kept
     span = np.linalg.norm(vertices[head[h]] - vertices[tail[h]], axis=1)
     bent[bent] = ~_is_noise(tail[h], head[h], span, bent, kept, len(vertices), edge_length)[bent]
+    if seams is not None:
+        cut = seams[h] & ~kept & ~bent
+        lines = kept | bent
+        bent |= cut & ~_is_noise(tail[h], head[h], span, cut, lines, len(vertices), edge_length)
     always = np.zeros(len(twin), np.bool_)
     always[h[kept]] = True
     return _trace(vertices, tail, head, twin, h[kept | bent], always, edge_length)

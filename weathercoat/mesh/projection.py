@@ -56,14 +56,14 @@ def walk_to(
 ) -> int:
     """Go from face `start` to closer faces, across no feature; writes the nearest point to `out` (3,)."""
     best = start
-    distance, out[0], out[1], out[2] = _closest_on_face(goal, start, vertices, faces)
+    distance, out[0], out[1], out[2] = closest_on_face(goal, start, vertices, faces)
     for _ in range(_FARTHEST_WALK):
         here = best
         for h in range(3 * here, 3 * here + 3):
             if twin[h] < 0 or crease[h] >= 0:
                 continue
             other = twin[h] // 3
-            d, x, y, z = _closest_on_face(goal, other, vertices, faces)
+            d, x, y, z = closest_on_face(goal, other, vertices, faces)
             if d < distance:
                 best, distance = other, d
                 out[0], out[1], out[2] = x, y, z
@@ -73,9 +73,10 @@ def walk_to(
 
 
 @kernel
-def _closest_on_face(
+def closest_on_face(
     goal: Vectors, f: int, vertices: Vectors, faces: Indices
 ) -> tuple[float, float, float, float]:
+    """Squared distance of a goal (3,) from face f, and the nearest point on it."""
     a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
     return closest_on_triangle(
         goal[0], goal[1], goal[2],

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from weathercoat.errors import LimitError, Note
+from weathercoat.mesh.charts import find_seams
 from weathercoat.mesh.connectivity import (
     FREE,
     EditableMesh,
@@ -50,6 +51,7 @@ from weathercoat.mesh.projection import InputSurface, barycentric_of
 from weathercoat.mesh.slices import in_slices
 from weathercoat.mesh.smoothing import apply_moves, fan_normals, smooth
 from weathercoat.mesh.surface import Indices, Place, Surface, Vectors, face_areas
+from weathercoat.mesh.transfer import transfer
 
 _QUANTUM = (
     1.0471e-10  # to which positions in the frame are rounded; no simple fraction, so that none lies half-way
@@ -103,14 +105,15 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
     """
     frame = make_frame(surface)
     local = _rounded(frame.localise(surface.vertices))
-    ordered, old_face = order_surface(replace(surface, uv=None, colors=None, place=None), local)
+    ordered, old_face = order_surface(replace(surface, place=None), local)
     local = _rounded(frame.localise(ordered.vertices))
     areas = face_areas(local, ordered.faces)
     edge_length = float(np.sqrt(4.0 * np.sum(areas) / (np.sqrt(3.0) * parameters.faces)))
     _require_limit(local, ordered.faces, areas, edge_length, frame.size, parameters)
     twin = make_twins(ordered.faces)
     bend = float(np.radians(parameters.crease_angle))
-    features = find_features(local, ordered.faces, twin, ordered.face_group, bend, edge_length)
+    seams = None if ordered.uv is None else find_seams(ordered.uv, twin)
+    features = find_features(local, ordered.faces, twin, ordered.face_group, bend, edge_length, seams)
     source = InputSurface(local, ordered.faces, twin, features.crease)
     mesh = _iterate(_start(features, source), features, source, edge_length, parameters)
     mesh, kept = _keep_degenerate_components(mesh, features, source)
@@ -121,10 +124,9 @@ def remesh(surface: Surface, parameters: RemeshParameters) -> Surface:
         vertices=np.sum(barycentric[:, :, None] * ordered.vertices[ordered.faces[face]], axis=1),
         faces=mesh.tail.reshape(-1, 3).copy(),
         face_group=ordered.face_group[mesh.source],
-        uv=None,
-        colors=None,
         place=Place(old_face[face], _turn_back(barycentric, ordered, face, surface, old_face[face])),
     )
+    result = transfer(result, ordered, source, mesh.source, Place(face, barycentric), mesh.position)
     angles = smallest_angles(mesh)
     if kept:
         message = "components are so thin for these edges that they were left as they came"

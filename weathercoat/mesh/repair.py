@@ -23,7 +23,7 @@ from weathercoat.errors import (
 from weathercoat.mesh import topology
 from weathercoat.mesh.buckets import compact_indices, order_rows
 from weathercoat.mesh.formats.polygons import Polygons
-from weathercoat.mesh.surface import Surface
+from weathercoat.mesh.surface import Surface, face_normals
 from weathercoat.mesh.topology import dot, normal_of
 from weathercoat.mesh.triangulate import triangulate
 from weathercoat.mesh.weld import SINGLE, weld
@@ -45,6 +45,7 @@ MAX_NEEDLE_RATIO = 1e-6
 MAX_ROUNDS = 8
 # A model is called soup where more than this share of its faces has no neighbour.
 SOUP_SHARE = 0.5
+_SAME_COLOR = 1.5 / 255.0
 MIN_SOUP_FACES = 10
 
 
@@ -89,12 +90,15 @@ def repair(
         notes.append(Note("W-UNREFERENCED", unreferenced, "vertices that no face uses were dropped"))
     vertices = polygons.positions[kept_vertices]
     faces = vertex[triangles]
-    uv = np.zeros((len(faces), 3, 2)) if polygons.uv is None else polygons.uv[triangles]
+    given = [values[triangles] for values in (polygons.uv, polygons.normals) if values is not None]
+    values = np.concatenate([np.zeros((len(faces), 3, 0)), *given], axis=2)
+    if polygons.colors is not None:
+        notes += _lost_colors(polygons, vertex, kept_vertices)
     face_group = (
         np.zeros(len(faces), np.int32) if polygons.face_group is None else polygons.face_group[polygon]
     )
 
-    faces, uv, source, degenerate = remove_degenerate(vertices, faces, uv)
+    faces, values, source, degenerate = remove_degenerate(vertices, faces, values)
     if degenerate + too_small:
         notes.append(Note("W-DEGENERATE", degenerate + too_small, "faces without area were removed"))
     if not len(faces):
@@ -102,11 +106,15 @@ def repair(
     keep = first_of_duplicates(faces)
     if not keep.all():
         notes.append(Note("W-DUPLICATE", int((~keep).sum()), "faces on the vertices of another were dropped"))
-        faces, source, uv = faces[keep], source[keep], uv[keep]
+        faces, source, values = faces[keep], source[keep], values[keep]
 
     faces, flipped, parent, more = make_oriented_manifold(vertices, faces)
     notes += more
-    uv[flipped] = uv[flipped][:, [0, 2, 1]]
+    values[flipped] = values[flipped][:, [0, 2, 1]]
+    uv = None if polygons.uv is None else np.ascontiguousarray(values[:, :, :2])
+    normals = None
+    if polygons.normals is not None:
+        normals = _shading_normals(values[:, :, -3:], flipped, face_normals(vertices[parent], faces))
     used, compact = compact_indices(faces, len(parent))
     origin = kept_vertices[parent[used]]
     return Surface(
@@ -114,13 +122,38 @@ def repair(
         faces=compact,
         face_group=face_group[source].astype(np.int32),
         groups=polygons.groups,
-        uv=None if polygons.uv is None else uv,
+        uv=uv,
+        normals=normals,
+        face_part=None if polygons.face_part is None else polygons.face_part[polygon[source]],
+        parts=polygons.parts,
+        materials=polygons.materials,
         colors=None if polygons.colors is None else polygons.colors[origin],
         up=up,
         notes=tuple(notes),
         name=name,
         format=format,
     )
+
+
+def _lost_colors(polygons: Polygons, vertex: Faces, kept: Indices) -> list[Note]:
+    """Notes on vertices that were merged with another of another colour: the first one's counts."""
+    assert polygons.colors is not None
+    used = np.unique(polygons.corners)
+    away = np.abs(polygons.colors[used] - polygons.colors[kept[vertex[used]]]).max(axis=1) > _SAME_COLOR
+    text = "vertices have another colour than the one at their place that was kept"
+    return [Note("W-COLORS", int(away.sum()), text)] if away.any() else []
+
+
+def _shading_normals(
+    normals: NDArray[np.float64], flipped: NDArray[np.bool_], facing: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Normals (m, 3, 3) of the corners, turned with the faces that were `flipped`; where there is none that
+    of the face, which points along `facing` (m, 3).
+    """
+    turned = np.where(flipped[:, None, None], -normals, normals)
+    flat = facing / np.linalg.norm(facing, axis=1, keepdims=True)
+    length = np.linalg.norm(turned, axis=2, keepdims=True)
+    return np.where(length > 0.5, turned / np.where(length > 0.5, length, 1.0), flat[:, None])
 
 
 def check_precision(points: Points, corners: int, single_precision: bool) -> None:
@@ -148,22 +181,23 @@ def check_precision(points: Points, corners: int, single_precision: bool) -> Non
 
 
 def remove_degenerate(
-    vertices: Points, faces: Faces, uv: NDArray[np.float64]
+    vertices: Points, faces: Faces, values: NDArray[np.float64]
 ) -> tuple[Faces, NDArray[np.float64], Indices, int]:
     """Remove the faces without area, and leave no crack where they were.
 
     A face with a repeated vertex is dropped. A needle, two of whose corners all but coincide, is closed by
     merging them. A cap, one of whose corners lies on the opposite edge, is flipped away with the neighbour
-    across that edge, which so takes in the corner; at a boundary it is dropped. Returns faces, uv, for each
+    across that edge, which so takes in the corner; at a boundary it is dropped. Returns faces, the
+    values at their corners (m, 3, k), for each
     face the one whose attributes it has, and how many had no area.
     """
     source = np.arange(len(faces))
     degenerate = int((_has_repeats(faces) | is_flat(vertices, faces)).sum())
     if not degenerate:
-        return faces, uv, source, 0
-    uv = uv.copy()
+        return faces, values, source, 0
+    values = values.copy()
     for _ in range(MAX_ROUNDS):
-        faces, uv, source = _select(~_has_repeats(faces), faces, uv, source)
+        faces, values, source = _select(~_has_repeats(faces), faces, values, source)
         flat = np.flatnonzero(is_flat(vertices, faces))
         if not len(flat):
             break
@@ -172,15 +206,15 @@ def remove_degenerate(
             faces = _merge_shortest(vertices, faces, needles)
         else:
             twin, _ = topology.match_twins(vertices, faces)
-            _flip_flat(vertices, faces, twin, uv, source, flat)
-    faces, uv, source = _select(~(_has_repeats(faces) | is_flat(vertices, faces)), faces, uv, source)
-    return faces, uv, source, degenerate
+            _flip_flat(vertices, faces, twin, values, source, flat)
+    faces, values, source = _select(~(_has_repeats(faces) | is_flat(vertices, faces)), faces, values, source)
+    return faces, values, source, degenerate
 
 
 def _select(
-    keep: NDArray[np.bool_], faces: Faces, uv: NDArray[np.float64], source: Indices
+    keep: NDArray[np.bool_], faces: Faces, values: NDArray[np.float64], source: Indices
 ) -> tuple[Faces, NDArray[np.float64], Indices]:
-    return faces[keep], uv[keep], source[keep]
+    return faces[keep], values[keep], source[keep]
 
 
 def _has_repeats(faces: Faces) -> NDArray[np.bool_]:
@@ -293,7 +327,7 @@ def _drop_nonfinite(polygons: Polygons) -> list[Note]:
 
 
 @kernel
-def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-untyped-def]
+def _flip_flat(vertices, faces, twin, values, source, flat):  # type: ignore[no-untyped-def]
     """Flip the faces `flat` with their neighbours, in place; those that cannot be get vertex 0 three times.
 
     Flat faces that this makes are flipped in turn, but needles are left.
@@ -325,8 +359,12 @@ def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-unty
         r, s, d = faces[g, j], faces[g, (j + 1) % 3], faces[g, (j + 2) % 3]
         along = vertices[s] - vertices[r]
         share = dot(vertices[b] - vertices[r], along) / longest
-        uv_r, uv_s, uv_d = uv[g, j].copy(), uv[g, (j + 1) % 3].copy(), uv[g, (j + 2) % 3].copy()
-        uv_b = uv_r + share * (uv_s - uv_r)
+        value_r, value_s, value_d = (
+            values[g, j].copy(),
+            values[g, (j + 1) % 3].copy(),
+            values[g, (j + 2) % 3].copy(),
+        )
+        value_b = value_r + share * (value_s - value_r)
         side_q = twin[3 * f + (i + 1) % 3]
         side_p = twin[3 * f + (i + 2) % 3]
         side_r, side_s = (side_p, side_q) if r == p else (side_q, side_p)
@@ -335,8 +373,8 @@ def _flip_flat(vertices, faces, twin, uv, source, flat):  # type: ignore[no-unty
         # g becomes (r, b, d), f becomes (b, s, d).
         faces[g, 0], faces[g, 1], faces[g, 2] = r, b, d
         faces[f, 0], faces[f, 1], faces[f, 2] = b, s, d
-        uv[g, 0], uv[g, 1], uv[g, 2] = uv_r, uv_b, uv_d
-        uv[f, 0], uv[f, 1], uv[f, 2] = uv_b, uv_s, uv_d
+        values[g, 0], values[g, 1], values[g, 2] = value_r, value_b, value_d
+        values[f, 0], values[f, 1], values[f, 2] = value_b, value_s, value_d
         source[f] = source[g]
         _connect(twin, 3 * g, side_r)
         _connect(twin, 3 * g + 2, beyond_r)

@@ -104,7 +104,7 @@ class _Reader:
         try:
             # Numbers that are not finite, or too large, are found and reported by the checks, not by NumPy.
             with np.errstate(invalid="ignore", over="ignore"):
-                polygons = gather_polygons(self.document, [({"mesh": number}, np.eye(4))])
+                polygons = gather_polygons(self.document, [PlacedNode(-1, -1, {"mesh": number}, np.eye(4))])
                 faces = sum(len(s.faces) for s in self.surfaces.values() if s is not None)
                 if faces + len(polygons.sizes) > self.max_faces:
                     raise LimitError(f"the meshes have more than {self.max_faces} triangles together")

@@ -23,13 +23,16 @@ from weathercoat.mesh.formats.gltf_document import (
     NORMALISED,
     UNSIGNED,
     GltfDocument,
+    PlacedNode,
     check_index,
     malformed_is_corrupt,
     natural,
 )
+from weathercoat.mesh.formats.gltf_materials import read_materials
 from weathercoat.mesh.formats.obj import number_groups
 from weathercoat.mesh.formats.ply import strip_triangles
 from weathercoat.mesh.formats.polygons import Polygons
+from weathercoat.mesh.surface import Part
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 # Extensions that put the geometry of a primitive elsewhere.
@@ -46,6 +49,8 @@ class _Parts:
     uv: list[NDArray[np.float64] | None] = field(default_factory=list)
     colors: list[NDArray[np.float64] | None] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
+    normals: list[NDArray[np.float64] | None] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     nodes: list[int] = field(default_factory=list)
     corners: int = 0
 
@@ -57,22 +62,20 @@ def read_gltf(data: bytes, folder: Path | None) -> Polygons:
     """
     with malformed_is_corrupt():
         document = GltfDocument(data, folder)
-        placed = [(node.entry, node.matrix) for node in document.placed_nodes() if "mesh" in node.entry]
+        placed = [node for node in document.placed_nodes() if "mesh" in node.entry]
         result = gather_polygons(document, placed)
         result.notes += _lost(document) if len(result.sizes) else []
     return result
 
 
-def gather_polygons(
-    document: GltfDocument, placed: Iterable[tuple[dict[str, Any], NDArray[np.float64]]]
-) -> Polygons:
-    """The triangles of the meshes of nodes, each under its matrix (4, 4); those of two nodes are two parts.
+def gather_polygons(document: GltfDocument, placed: Iterable[PlacedNode]) -> Polygons:
+    """The triangles of the meshes of nodes, each under its matrix; those of two nodes are never welded.
 
     Call it within `malformed_is_corrupt`.
     """
     parts = _Parts()
-    for number, (node, matrix) in enumerate(placed):
-        _add_mesh(document, parts, number, node, matrix)
+    for number, node in enumerate(placed):
+        _add_mesh(document, parts, number, node)
     if not parts.triangles:
         return Polygons(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), shared=False)
     sizes = [len(p) for p in parts.positions]
@@ -82,6 +85,7 @@ def gather_polygons(
     face_group, groups = number_groups(part, parts.names)
     corners = triangles.ravel()
     uv = _joined(parts.uv, sizes, np.zeros(2))
+    normals = _joined(parts.normals, sizes, np.zeros(3))
     result = Polygons(
         positions=np.concatenate(parts.positions),
         corners=corners,
@@ -90,6 +94,10 @@ def gather_polygons(
         face_group=face_group,
         groups=groups,
         colors=_joined(parts.colors, sizes, np.ones(4)),
+        normals=None if normals is None else normals[corners],
+        face_part=part.astype(np.int32),
+        parts=tuple(parts.parts),
+        materials=read_materials(document),
         part=np.repeat(parts.nodes, sizes),
         single_precision=True,
         shared=False,
@@ -119,9 +127,8 @@ def passed_over(document: GltfDocument) -> list[Note]:
     return [Note(code, count, text) for code, count, text in found if count]
 
 
-def _add_mesh(
-    document: GltfDocument, parts: _Parts, number: int, node: dict[str, Any], matrix: NDArray[np.float64]
-) -> None:
+def _add_mesh(document: GltfDocument, parts: _Parts, number: int, placed: PlacedNode) -> None:
+    node, matrix = placed.entry, placed.matrix
     check_index(node["mesh"], document.json.get("meshes", []), "mesh")
     mesh = document.json["meshes"][node["mesh"]]
     document.note_unknown(mesh, "mesh")
@@ -161,7 +168,17 @@ def _add_mesh(
             mirrored = np.linalg.det(matrix[:3, :3]) < 0
         parts.triangles.append(triangles[:, [0, 2, 1]] if mirrored else triangles)
         parts.names.append(_name(document, primitive, mesh, node))
+        parts.parts.append(
+            Part(
+                str(node.get("name") or mesh.get("name") or "default"),
+                primitive.get("material", -1),
+                placed.number,
+                tuple(matrix.ravel().tolist()),
+            )
+        )
         parts.nodes.append(number)
+        normals = _attribute(document, attributes, "NORMAL", len(local), ("VEC3",))
+        parts.normals.append(None if normals is None else _turned(normals, matrix))
         uv = _attribute(document, attributes, "TEXCOORD_0", len(local), ("VEC2",))
         # glTF counts v from the top of the image, a Surface from the bottom, as OBJ does
         parts.uv.append(None if uv is None else np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1))
@@ -188,6 +205,18 @@ def _attribute(
     if len(values) != count:
         raise CorruptError(f"{name} has {len(values)} values for {count} vertices")
     return values
+
+
+def _turned(normals: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normals (n, 3) under a matrix, of any length: by its cofactors, which also serve where it is flat."""
+    a, b, c = matrix[:3, :3].T
+    with np.errstate(invalid="ignore", over="ignore"):
+        turned = (
+            normals[:, :1] * np.cross(b, c)
+            + normals[:, 1:2] * np.cross(c, a)
+            + normals[:, 2:] * np.cross(a, b)
+        )
+        return turned * np.sign(np.linalg.det(matrix[:3, :3]))
 
 
 def _triangles(indices: NDArray[np.int64], mode: int, vertices: int, mesh: object) -> NDArray[np.int64]:

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.errors import CorruptError, Note
+from weathercoat.mesh.materials import SourceMaterial
+from weathercoat.mesh.surface import Part
 
 
 @dataclass
@@ -19,6 +21,8 @@ class Polygons:
     uv: float64 (k, 2), a texture coordinate per corner, or None.
     face_group: int32 (m,), an index into `groups`.
     colors: float64 (n, 4), RGBA from 0 to 1, sRGB-encoded, or None.
+    normals: float64 (k, 3), a unit shading normal per corner, zero where it has none, or None.
+    face_part: int32 (m,), an index into `parts`, or None; materials: those of the parts.
     part: int64 (n,), vertices of different parts (instances, nodes) are never welded; or None.
     single_precision: positions are stored as float32, so that equal points may differ by its rounding.
     shared: faces of this format share their vertices by index, so that a repeated position is worth a note.
@@ -31,6 +35,10 @@ class Polygons:
     face_group: NDArray[np.int32] | None = None
     groups: tuple[str, ...] = ("default",)
     colors: NDArray[np.float64] | None = None
+    normals: NDArray[np.float64] | None = None
+    face_part: NDArray[np.int32] | None = None
+    parts: tuple[Part, ...] = ()
+    materials: tuple[SourceMaterial, ...] = ()
     part: NDArray[np.int64] | None = None
     single_precision: bool = False
     shared: bool = True
@@ -60,13 +68,20 @@ class Polygons:
         self.notes.append(Note("W-BADINDEX", dropped, "faces with an illegal index were dropped"))
 
     def tidy_attributes(self) -> None:
-        """Make texture coordinates and colours zero where they are not finite, with a note; clip colours."""
+        """Make texture coordinates and colours zero where they are not finite, with a note; clip colours, and
+        give normals the length 1, or 0 where they have none.
+        """
         for values, name in ((self.uv, "texture coordinates"), (self.colors, "colours")):
             broken = None if values is None else np.logical_not(np.isfinite(values).all(axis=1))
             if values is not None and broken is not None and broken.any():
                 values[broken] = 0.0
                 text = f"{name} are not finite and were set to zero"
                 self.notes.append(Note("W-NONFINITE", int(broken.sum()), text))
+        if self.normals is not None:
+            with np.errstate(invalid="ignore", over="ignore"):
+                length = np.linalg.norm(self.normals, axis=1, keepdims=True)
+                self.normals = self.normals / length
+            self.normals[~np.isfinite(self.normals).all(axis=1)] = 0.0
         if self.colors is not None:
             np.clip(self.colors, 0.0, 1.0, out=self.colors)
 
@@ -77,5 +92,9 @@ class Polygons:
         self.sizes = self.sizes[keep]
         if self.uv is not None:
             self.uv = self.uv[keep_corner]
+        if self.normals is not None:
+            self.normals = self.normals[keep_corner]
+        if self.face_part is not None:
+            self.face_part = self.face_part[keep]
         if self.face_group is not None:
             self.face_group = self.face_group[keep]
