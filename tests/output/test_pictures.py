@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from tests.output.scenes import make_peeled_snapshot, make_plate, make_sphere
 from weathercoat.mesh.surface import make_surface
 from weathercoat.output import pictures
-from weathercoat.output.camera import make_camera
+from weathercoat.output.camera import Camera, make_camera, turntable, zoomed
+from weathercoat.output.display import Normalisation
 from weathercoat.output.pictures import (
     PictureParameters,
     contact_sheet,
@@ -175,6 +176,45 @@ def test_the_camera_sees_the_untouched_parts_too() -> None:
     assert red.any() and not red[:2].any() and not red[-2:].any()
 
 
+def in_view(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Where points are seen, -1 to 1 across and up the picture."""
+    x, y, depth = np.stack([camera.right, camera.up, camera.forward]) @ (points - camera.position).T
+    assert depth.min() > 0
+    return x / depth / camera.tangent_x, y / depth / camera.tangent_y
+
+
+def test_a_camera_that_knows_the_films_has_all_of_them_in_view() -> None:
+    base = plate(0.5)
+    far = replace(base, film_vertices=np.add(base.film_vertices, [0.0, 0.4, 0.5]))
+    points = Normalisation.of(base)(far.film_vertices)
+    seen = frame_camera(base, SMALL, films=[base, far])
+    assert max(np.abs(axis).max() for axis in in_view(points, seen)) <= 0.9 + 1e-9
+    assert max(np.abs(axis).max() for axis in in_view(points, frame_camera(base, SMALL))) > 1.0
+
+
+def test_a_turntable_goes_round_with_everything_in_view_and_wastes_no_room() -> None:
+    points = np.random.default_rng(2).uniform(-1, 1, (60, 3)) * [1.0, 0.4, 0.2]
+    up = np.array([0.0, 1.0, 0.0])
+    first = make_camera(points, points, (0.0, 1.0, 0.0), aspect=1.3, azimuth=20.0, elevation=15.0, margin=0.1)
+    cameras = turntable(first, points, up, 12, margin=0.1)
+    extents = [max(np.abs(axis).max() for axis in in_view(points, camera)) for camera in cameras]
+    assert max(extents) == pytest.approx(0.9, abs=1e-9)
+    assert np.allclose(cameras[0].forward, first.forward)
+    azimuths = np.unwrap([np.arctan2(camera.forward[0], camera.forward[2]) for camera in cameras])
+    assert np.allclose(np.abs(np.diff(azimuths)), np.pi / 6)
+    assert np.allclose([camera.forward @ up for camera in cameras], first.forward @ up)
+
+
+def test_zoom_makes_larger_and_a_centre_is_in_the_middle() -> None:
+    camera = frame_camera(plate(0.0), SMALL)
+    point = np.array([[0.2, 0.1, 0.0]])
+    near = zoomed(camera, 4.0, point[0])
+    assert np.allclose(in_view(point, near), 0.0)
+    assert np.ptp(in_view(np.array([[0.2, 0.1, 0.0], [0.21, 0.1, 0.0]]), near)[0]) == pytest.approx(
+        4.0 * np.ptp(in_view(np.array([[0.2, 0.1, 0.0], [0.21, 0.1, 0.0]]), zoomed(camera, 1.0, point[0]))[0])
+    )
+
+
 def test_intact_paint_has_the_hue_of_the_paint() -> None:
     green = middle(render_snapshot(plate(0.0), replace(SMALL, paint=(0.2, 0.6, 0.25))))
     red = middle(render_snapshot(plate(0.0), replace(SMALL, paint=(0.7, 0.15, 0.1))))
@@ -224,10 +264,11 @@ def test_lifted_film_casts_a_shadow_on_the_metal_and_attached_film_hides_it() ->
             film_faces=strip,
             film_rust=np.zeros(441),
         )
-        parameters = replace(SMALL, width=200, height=160, paint=(0.9, 0.1, 0.1))
-        return render_snapshot(lifted, parameters).astype(float)
+        return render_snapshot(lifted, parameters, camera=camera).astype(float)
 
-    bare = render_snapshot(base, replace(SMALL, width=200, height=160)).astype(float)
+    parameters = replace(SMALL, width=200, height=160, paint=(0.9, 0.1, 0.1))
+    camera = frame_camera(base, parameters, films=[base])
+    bare = render_snapshot(base, parameters, camera=camera).astype(float)
 
     def darkened(image: np.ndarray) -> float:
         """Share of the picture that shows metal, not half as bright as without the film."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,3 +151,46 @@ def _fit(
     extent = float(np.ptp(vertices, axis=0).max())
     back = min(*nearest, float(depth.min()) - 0.05 * extent)
     return centre[0] * right + centre[1] * up + back * forward  # type: ignore[no-any-return]
+
+
+def zoomed(camera: Camera, zoom: float, centre: Vectors | None = None) -> Camera:
+    """The camera with a lens `zoom` times as long, moved sideways so that `centre` (3,), where one is given,
+    is in the middle of the picture.
+    """
+    position = camera.position
+    if centre is not None:
+        away = centre - position
+        position = centre - (away @ camera.forward) * camera.forward
+    return replace(
+        camera, position=position, tangent_x=camera.tangent_x / zoom, tangent_y=camera.tangent_y / zoom
+    )
+
+
+def turntable(camera: Camera, points: Vectors, up: Vectors, count: int, *, margin: float) -> list[Camera]:
+    """`count` cameras once round the points (k, 3), beginning at the azimuth of `camera`, all as far from the
+    middle of the points that none of them leaves any picture.
+
+    `up` (3,) is the unit vector that they turn about; margin: share of half the picture that stays free.
+    """
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    away = points - centre
+    turned, distance = [], 0.0
+    for index in range(count):
+        angle = 2.0 * np.pi * index / count
+        right, upright, forward = (
+            _turned_about(axis, up, angle) for axis in (camera.right, camera.up, camera.forward)
+        )
+        turned.append((right, upright, forward))
+        for axis, tangent in ((right, camera.tangent_x), (upright, camera.tangent_y)):
+            needed = np.abs(away @ axis) / (tangent * (1.0 - margin)) - away @ forward
+            distance = max(distance, float(needed.max()))
+    return [
+        replace(camera, position=centre - distance * forward, right=right, up=upright, forward=forward)
+        for right, upright, forward in turned
+    ]
+
+
+def _turned_about(vector: Vectors, axis: Vectors, angle: float) -> Vectors:
+    """A vector turned about a unit axis (Rodrigues' formula)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * vector + s * np.cross(axis, vector) + (1.0 - c) * (axis @ vector) * axis  # type: ignore[no-any-return]

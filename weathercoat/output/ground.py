@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from weathercoat.mesh.surface import Vectors
 from weathercoat.output.camera import Camera
 from weathercoat.output.lighting import filter_light, key_directions, sky_directions
+from weathercoat.output.lights import Light
 from weathercoat.output.rays import RayQueries
 
-_KEY_SHARE = 0.6  # of the light on open ground
-_STRENGTH = 0.75  # 1 would be as dark as the light makes it
 _SKY_RAYS = 2
 
 
@@ -23,7 +22,7 @@ def ground_shadow(
     up: Vectors,
     level: float,
     radius: float,
-    key: Vectors,
+    light: Light,
     reach: float,
 ) -> NDArray[np.float64]:
     """What the background of each pixel is multiplied by, (height, width): 1 on open ground, less in shadow.
@@ -33,6 +32,7 @@ def ground_shadow(
     """
     height, width = wanted.shape
     factor = np.ones(wanted.shape)
+    key = light.direction(camera, up)
     above = float(camera.position @ up) - level
     if above <= 0.0:
         return factor
@@ -46,7 +46,7 @@ def ground_shadow(
     row, column = (met // width).astype(np.int32), (met % width).astype(np.int32)
     facet = np.tile(up, (len(met), 1))
     origins, directions = point.astype(np.float32), np.empty((len(met), 3), np.float32)
-    key_directions(row, column, key, 0, 1, directions)
+    key_directions(row, column, key, light.radius, 0, 1, directions)
     lit = (~rays.blocked(origins, directions, 1e4)).astype(np.float64)
     sky = np.zeros((len(met), 3))
     for index in range(_SKY_RAYS):
@@ -58,7 +58,7 @@ def ground_shadow(
     for stride in (1, 3):
         filter_light(number, stride, row, column, point, facet, 1e-3, lit, sky, smooth_lit, smooth_sky)
         lit, sky, smooth_lit, smooth_sky = smooth_lit, smooth_sky, lit, sky
-    light = _KEY_SHARE * lit + (1.0 - _KEY_SHARE) * sky[:, 0]
+    brightness = light.key_share * lit + (1.0 - light.key_share) * sky[:, 0]
     fade = np.clip((radius - away) / (0.4 * radius), 0.0, 1.0)
-    factor[row, column] = 1.0 - _STRENGTH * fade * (1.0 - light)
+    factor[row, column] = 1.0 - light.shade * fade * (1.0 - brightness)
     return factor

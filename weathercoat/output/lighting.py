@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.output.lights import Light
 from weathercoat.output.rays import RayQueries
 from weathercoat.output.shading import add_sky
 
-_SUN_RADIUS = 0.09  # radians: soft enough to read as a shadow of something near
 _STRATA = (
     16  # neighbouring samples share one set of directions: each 4 x 4 block covers the hemisphere evenly
 )
@@ -27,6 +27,7 @@ def gather_light(
     *,
     key: NDArray[np.float64],
     up: NDArray[np.float64],
+    light: Light,
     sky_rays: int,
     key_rays: int,
     reach: float,
@@ -39,14 +40,15 @@ def gather_light(
     """
     count = len(position)
     origins = (position + _LIFT * facet).astype(np.float32)
+    radiance = light.sky()
     directions = np.empty((count, 3), np.float32)
     lit, sky = np.zeros(count), np.zeros((count, 3))
     for index in range(key_rays):
-        key_directions(row, column, key, index, key_rays, directions)
+        key_directions(row, column, key, light.radius, index, key_rays, directions)
         lit += ~rays.blocked(origins, directions, 1e4)
     for index in range(sky_rays):
         sky_directions(row, column, facet, normal, index, sky_rays, directions)
-        add_sky(directions, rays.blocked(origins, directions, reach), up, sky)
+        add_sky(directions, rays.blocked(origins, directions, reach), up, radiance, sky)
     return lit / key_rays, sky / sky_rays
 
 
@@ -117,14 +119,20 @@ def sky_directions(
 
 @kernel
 def key_directions(
-    row: Indices, column: Indices, key: Vectors, index: int, total: int, out: NDArray[np.float32]
+    row: Indices,
+    column: Indices,
+    key: Vectors,
+    disc: float,
+    index: int,
+    total: int,
+    out: NDArray[np.float32],
 ) -> None:
-    """A direction within the key light's disc for each sample, (s, 3)."""
+    """A direction within the key light's disc, of the radius `disc`, for each sample, (s, 3)."""
     t, b, point = np.empty(3), np.empty(3), np.empty(2)
     _frame(key, t, b)
     for i in range(len(row)):
         _stratified(row[i], column[i], index, total, point)
-        radius, angle = _SUN_RADIUS * np.sqrt(point[0]), 2.0 * np.pi * point[1]
+        radius, angle = disc * np.sqrt(point[0]), 2.0 * np.pi * point[1]
         x, y = radius * np.cos(angle), radius * np.sin(angle)
         length = np.sqrt(1.0 + radius * radius)
         for c in range(3):

@@ -20,6 +20,7 @@ from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import DisplayMesh, Normalisation, make_display_mesh
 from weathercoat.output.ground import ground_shadow
 from weathercoat.output.lighting import filter_light, gather_light, share_samples
+from weathercoat.output.lights import BACKGROUNDS, LIGHTS, Light
 from weathercoat.output.materials import apply_materials
 from weathercoat.output.rays import RayQueries, make_rays
 from weathercoat.output.shading import (
@@ -50,12 +51,13 @@ class PictureParameters:
     """How a picture is taken. Colours are sRGB, 0 to 1; lengths are in sizes (square roots of the substrate's
     area).
 
-    width, height: pixels. azimuth, elevation: degrees of the view, see `camera.make_camera`; margin: share of
-    half the picture that stays free on each side. samples: side of the square of samples in each pixel;
+    width, height: pixels. azimuth, elevation: degrees of the view, see `camera.make_camera`; margin: share
+    of half the picture that stays free on each side. samples: side of the square of samples in each pixel;
     sky_rays, key_rays: rays for each sample towards the sky and the key light; reach: distance within which
     things block the sky. Colours are those of clean materials: the stains come from the snapshot's scalars.
-    look: where the film shows the materials of the input: auto, model or paint, see
-    `materials.film_materials`.
+    light: one of `lights.LIGHTS`; background: None for none, which makes a picture with an alpha channel;
+    has_ground: whether a shadow falls on a ground. look: where the film shows the materials of the input:
+    auto, model or paint, see `materials.film_materials`.
     """
 
     width: int = 520
@@ -69,7 +71,9 @@ class PictureParameters:
     reach: float = 0.6
     film_thickness: float = 0.0028
     metal_thickness: float = 0.012
-    background: Color = (0.845, 0.845, 0.835)
+    light: str = "studio"
+    background: Color | None = BACKGROUNDS["grey"]
+    has_ground: bool = True
     paint: Color = (0.16, 0.53, 0.60)
     primer: Color = (0.83, 0.79, 0.70)
     metal: Color = (0.47, 0.49, 0.51)
@@ -82,7 +86,7 @@ class PictureParameters:
     look: str = "auto"
 
 
-_KEY = 2.75 * np.array([1.0, 0.95, 0.87])
+_CURL_REACH = 0.06  # in sizes: how far curls usually stand off, for pictures that do not know them yet
 _SAME_SURFACE = 0.004  # distance from a plane, in sizes, within which samples count as one surface
 _RAYS_AT_ONCE = 100_000  # a fraction of a second, so that Ctrl-C is answered
 _STAIN_DEPTH = np.array([0.35, 1.1, 2.2])  # a stain takes away blue first
@@ -94,16 +98,15 @@ def frame_camera(
     *,
     up: Axis = _Y_UP,
     untouched: Surface | None = None,
+    films: Sequence[Snapshot] = (),
 ) -> Camera:
-    """The camera, in display units, that frames the substrate and the untouched parts: the same for all of a
-    run.
+    """The camera, in display units, that frames the substrate and the untouched parts, the same for all of a
+    run, and the films of `films`; without any it leaves room for curls.
     """
-    vertices, normals = snapshot.substrate_vertices, snapshot.substrate_normals
-    if untouched is not None:
-        vertices = np.concatenate([vertices, untouched.vertices])
-        normals = np.concatenate([normals, vertex_normals(untouched.vertices, untouched.faces)])
+    normalise = Normalisation.of(snapshot)
+    vertices, normals = framed_points(snapshot, untouched=untouched, films=films)
     return make_camera(
-        Normalisation.of(snapshot)(vertices),
+        normalise(vertices),
         normals,
         up,
         aspect=parameters.width / parameters.height,
@@ -111,6 +114,24 @@ def frame_camera(
         elevation=parameters.elevation,
         margin=parameters.margin,
     )
+
+
+def framed_points(
+    snapshot: Snapshot, *, untouched: Surface | None = None, films: Sequence[Snapshot] = ()
+) -> tuple[Vectors, Vectors]:
+    """The points (k, 3) in the model's units that a picture has to show, and the normals (j, 3) of those of
+    the model that say which way it faces; see `frame_camera`.
+    """
+    vertices, normals = [snapshot.substrate_vertices], [snapshot.substrate_normals]
+    if untouched is not None:
+        vertices.append(untouched.vertices)
+        normals.append(vertex_normals(untouched.vertices, untouched.faces))
+    if films:
+        vertices += [film.film_vertices for film in films]
+    else:
+        reach = _CURL_REACH * Normalisation.of(snapshot).size
+        vertices.append(snapshot.substrate_vertices + reach * snapshot.substrate_normals)
+    return np.concatenate(vertices), np.concatenate(normals)
 
 
 def render_snapshot(
@@ -121,7 +142,7 @@ def render_snapshot(
     untouched: Surface | None = None,
     camera: Camera | None = None,
 ) -> Image:
-    """A picture of a snapshot, uint8 (height, width, 3).
+    """A picture of a snapshot, uint8 (height, width, 3), or (height, width, 4) without a background.
 
     up: unit vector against gravity, in the model's axes; untouched: parts of the model that carry no paint,
     in its units; camera: one of `frame_camera`, which is also the default.
@@ -151,7 +172,7 @@ def render_mesh(
     up: Axis = _Y_UP,
     ground: tuple[float, float],
 ) -> Image:
-    """A picture of a display mesh, uint8 (height, width, 3).
+    """A picture of a display mesh, uint8 (height, width, 3), or (height, width, 4) without a background.
 
     ground: height along `up` of the invisible ground that shadows fall on, and the distance from the origin
     at which they have faded; in display units, as are the mesh and the camera.
@@ -162,24 +183,35 @@ def render_mesh(
     face, weights = _first_hits(rays, mesh, camera, width, height)
     seen = np.flatnonzero(face >= 0)
     upward = np.asarray(up, np.float64)
-    key = _key_direction(camera, upward)
-    light = _Light(key, upward, parameters)
-    color = _shaded(rays, mesh, face[seen], weights[seen], seen, (height, width), camera, light)
+    light = LIGHTS[parameters.light]
+    lighting = _Lighting(light, light.direction(camera, upward), upward, parameters)
+    color = _shaded(rays, mesh, face[seen], weights[seen], seen, (height, width), camera, lighting)
     picture = np.zeros((height * width, 3), np.float32)
     picture[seen] = color
+    shown = _pixel_means(picture.reshape(height, width, 3), factor)
     coverage = _pixel_means((face >= 0).astype(np.float32).reshape(height, width, 1), factor)
-    shadow = ground_shadow(
-        rays,
-        camera,
-        coverage[:, :, 0] < 1.0,
-        up=upward,
-        level=ground[0],
-        radius=ground[1],
-        key=key,
-        reach=parameters.reach,
-    )
-    background = (1.0 - coverage) * shadow[:, :, None] * to_linear(parameters.background)
-    return to_srgb(_pixel_means(picture.reshape(height, width, 3), factor) + background)
+    shadow = np.ones(coverage.shape)
+    if parameters.has_ground:
+        shadow[:, :, 0] = ground_shadow(
+            rays,
+            camera,
+            coverage[:, :, 0] < 1.0,
+            up=upward,
+            level=ground[0],
+            radius=ground[1],
+            light=light,
+            reach=parameters.reach,
+        )
+    if parameters.background is None:
+        return _with_alpha(shown, coverage, shadow)
+    return to_srgb(shown + (1.0 - coverage) * shadow * to_linear(parameters.background))
+
+
+def _with_alpha(shown: NDArray[np.float32], coverage: NDArray[np.float32], shadow: Vectors) -> Image:
+    """The picture as (height, width, 4): colours as they are, and the shadow as black that lets through."""
+    alpha = coverage + (1.0 - coverage) * (1.0 - shadow)
+    color = np.divide(shown, alpha, out=np.zeros(shown.shape), where=alpha > 0.0)
+    return np.concatenate([to_srgb(color), np.rint(255.0 * alpha).astype(np.uint8)], axis=2)
 
 
 def _pixel_means(samples: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
@@ -211,9 +243,10 @@ def _first_hits(
 
 
 @dataclass(frozen=True)
-class _Light:
-    """Directions towards the key light and up, and the parameters of the picture."""
+class _Lighting:
+    """The light, the directions towards its key light and up, and the parameters of the picture."""
 
+    light: Light
     key: Vectors
     up: Vectors
     parameters: PictureParameters
@@ -227,10 +260,10 @@ def _shaded(
     seen: NDArray[np.int64],
     shape: tuple[int, int],
     camera: Camera,
-    light: _Light,
+    lighting: _Lighting,
 ) -> NDArray[np.float32]:
     """Tone-mapped linear colours (s, 3) of the points on `face`, at `seen` in a picture of `shape`."""
-    parameters, width = light.parameters, shape[1]
+    parameters, light, width = lighting.parameters, lighting.light, shape[1]
     factor = parameters.samples
     number = np.full(shape, -1, np.int32)
     number.ravel()[seen] = np.arange(len(seen), dtype=np.int32)
@@ -249,8 +282,9 @@ def _shaded(
         s.position,
         s.facet,
         s.normal,
-        key=light.key,
-        up=light.up,
+        key=lighting.key,
+        up=lighting.up,
+        light=light,
         sky_rays=parameters.sky_rays,
         key_rays=parameters.key_rays,
         reach=parameters.reach,
@@ -262,16 +296,10 @@ def _shaded(
     color = np.empty((len(leaders), 3), np.float32)
     shade(
         s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, s.is_own,
-        s.roughness, s.metallic, s.occlusion, camera.position, light.key, _KEY, light.up,
-        _palette(parameters), smooth_lit, smooth_sky, color,
+        s.roughness, s.metallic, s.occlusion, camera.position, lighting.key, np.array(light.key_color),
+        light.sky(), light.box, lighting.up, _palette(parameters), smooth_lit, smooth_sky, color,
     )  # fmt: skip
     return color[follows]
-
-
-def _key_direction(camera: Camera, up: Vectors) -> Vectors:
-    """Towards the key light: from the upper left, low over what faces the camera, so that relief shows."""
-    direction = -0.62 * camera.right + 0.62 * up - 0.45 * camera.forward
-    return direction / np.linalg.norm(direction)  # type: ignore[no-any-return]
 
 
 def _palette(parameters: PictureParameters) -> Vectors:
@@ -287,7 +315,7 @@ def _palette(parameters: PictureParameters) -> Vectors:
 
 def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int | None = None) -> Image:
     """Pictures of one size in rows of `columns`, each with a small label in its lower left corner; uint8 (h,
-    w, 3). By default up to three are in a row, and more in a square.
+    w, 3 or 4). By default up to three are in a row, and more in a square.
     """
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
@@ -296,19 +324,21 @@ def contact_sheet(images: Sequence[Image], labels: Sequence[str], columns: int |
     if columns is None:
         columns = len(images) if len(images) <= 3 else math.ceil(math.sqrt(len(images)))
     rows = -(-len(images) // columns)
-    sheet = Pillow.new("RGB", (columns * width, rows * height), tuple(int(c) for c in images[0][0, 0]))
+    mode = "RGBA" if images[0].shape[2] == 4 else "RGB"
+    sheet = Pillow.new(mode, (columns * width, rows * height), tuple(int(c) for c in images[0][0, 0]))
     draw = ImageDraw.Draw(sheet)
     small = max(11, height // 28)
+    ink = (88, 88, 86) if images[0][0, 0, 1] > 60 or mode == "RGBA" else (190, 190, 188)
     font = ImageFont.load_default(small)
     for index, (image, label) in enumerate(zip(images, labels, strict=True)):
         left, top = index % columns * width, index // columns * height
         sheet.paste(Pillow.fromarray(image), (left, top))
-        draw.text((left + small, top + height - 2 * small), label, fill=(88, 88, 86), font=font)
+        draw.text((left + small, top + height - 2 * small), label, fill=ink, font=font)
     return np.asarray(sheet)
 
 
 def write_png(target: Path | BinaryIO, image: Image, *, compression: int = 6) -> None:
-    """Write an image (h, w, 3) uint8 as PNG, compressed from 0 to 9; OSError if the target cannot be
+    """Write an image (h, w, 3 or 4) uint8 as PNG, compressed from 0 to 9; OSError if the target cannot be
     written.
     """
     from PIL import Image as Pillow

@@ -18,6 +18,7 @@ from weathercoat.mesh.surface import Vectors
 FRONT, BACK, RIM, METAL, BARE_PART, OWN_PART = range(6)
 # Rows of the palette: colours, but for the optical depth of a full stain in red, green and blue.
 PRIMER, STEEL, RUST_RIM, RUST_BODY, RUST_CORE, STAIN, STAIN_DEPTH, DUST, UNPAINTED = range(9)
+_OPEN_SHARE = 0.906  # of the horizon's radiance: what a surface under the open sky receives
 
 
 def to_linear(srgb: object) -> NDArray[np.float64]:
@@ -153,10 +154,10 @@ def _rust_layer(
     mottle = 0.45 * patch + 0.55 * grain
     age = level + 2.4 * (0.5 - mottle) + 0.5 * (region - 0.5)
     body = _smooth_step(0.0, 0.4, age)
-    core = 0.9 * _smooth_step(0.35, 1.35, age)
+    core = 0.9 * _smooth_step(0.25, 1.2, age)
     powder = 0.55 * _smooth_step(0.54, 0.7, mottle) * _smooth_step(0.3, 0.7, region)
     pit = _smooth_step(0.6, 0.7, grain) * _smooth_step(0.2, 0.6, level)
-    shade = 0.6 + 0.8 * grain
+    shade = 0.5 + 0.85 * grain
     for c in range(3):
         rust = palette[RUST_RIM, c] + body * (palette[RUST_BODY, c] - palette[RUST_RIM, c])
         rust += core * (palette[RUST_CORE, c] - rust)
@@ -166,6 +167,19 @@ def _rust_layer(
     for axis in range(3):
         bump[axis] += cover * 0.009 * slope[axis]
     return cover
+
+
+@kernel
+def _brushed(rest: Vectors, bump: Vectors, slope: Vectors) -> float:
+    """Fine scratches along one direction of the metal, to `bump`; returns how bright they are, 0 to 1."""
+    x, y, z = rest[0], rest[1], rest[2]
+    along, across, over = 0.8 * x + 0.36 * y + 0.48 * z, -0.6 * x + 0.48 * y + 0.64 * z, -0.8 * y + 0.6 * z
+    value = gradient_noise(5.0 * along, 240.0 * across, 240.0 * over, slope)
+    a, b, c = 5.0 * slope[0], 240.0 * slope[1], 240.0 * slope[2]
+    bump[0] += 0.00012 * (0.8 * a - 0.6 * b)
+    bump[1] += 0.00012 * (0.36 * a + 0.48 * b - 0.8 * c)
+    bump[2] += 0.00012 * (0.48 * a + 0.64 * b + 0.6 * c)
+    return value
 
 
 @kernel
@@ -192,8 +206,8 @@ def _film_color(
             albedo[c] *= 0.84 + 0.32 * cloud
     gradient_noise(x * 95.0, y * 95.0, z * 95.0, slope)
     for axis in range(3):
-        bump[axis] += 0.028 * slope[axis]
-    roughness, gloss = 0.34 + 0.18 * cloud, 1.0
+        bump[axis] += 0.02 * slope[axis]  # orange peel
+    roughness, gloss = 0.20 + 0.20 * cloud, 1.0
     if stain > 0.01:
         # Streaks: fine across the fall line, long along it.
         fall = x * up[0] + y * up[1] + z * up[2]
@@ -242,23 +256,51 @@ def _ggx(
 
 
 @kernel
-def _sky(x_up: float, out: Vectors) -> None:
-    """Radiance from a direction with the component `x_up` along up: pale sky over warmer, darker ground."""
+def _sky(x_up: float, radiance: Vectors, out: Vectors) -> None:
+    """Radiance from a direction with the component `x_up` along up; `radiance` (3, 3) is that of the ground,
+    the horizon and the zenith.
+    """
     t = _smooth_step(-0.25, 0.35, x_up)
     high = max(0.0, x_up)
-    out[0] = (1.0 - t) * 0.30 + t * (0.92 - 0.20 * high)
-    out[1] = (1.0 - t) * 0.28 + t * (0.95 - 0.12 * high)
-    out[2] = (1.0 - t) * 0.26 + t * 1.00
+    for c in range(3):
+        level = radiance[1, c] + high * (radiance[2, c] - radiance[1, c])
+        out[c] = (1.0 - t) * radiance[0, c] + t * level
 
 
 @kernel
-def add_sky(directions: NDArray[np.float32], blocked: NDArray[np.bool_], up: Vectors, total: Vectors) -> None:
+def add_sky(
+    directions: NDArray[np.float32],
+    blocked: NDArray[np.bool_],
+    up: Vectors,
+    radiance: Vectors,
+    total: Vectors,
+) -> None:
     """Add to `total` (s, 3) the sky's light along one direction a sample; if blocked, a dim reflection."""
     sky = np.empty(3)
     for i in range(len(directions)):
-        _sky(directions[i, 0] * up[0] + directions[i, 1] * up[1] + directions[i, 2] * up[2], sky)
+        x_up = directions[i, 0] * up[0] + directions[i, 1] * up[1] + directions[i, 2] * up[2]
+        _sky(x_up, radiance, sky)
         for c in range(3):
             total[i, c] += 0.07 * sky[c] if blocked[i] else sky[c]
+
+
+@kernel
+def _soft_box(reflected: Vectors, key: Vectors, side: Vectors, blur: float) -> float:
+    """How much of a soft box round the key light a reflected ray meets, 0 to 1; `side` is its horizontal
+    axis, `blur` how far a rough surface spreads its edge.
+    """
+    towards, across, along = 0.0, 0.0, 0.0
+    for x in range(3):
+        y, z = (x + 1) % 3, (x + 2) % 3
+        towards += reflected[x] * key[x]
+        across += reflected[x] * side[x]
+        along += reflected[x] * (key[y] * side[z] - key[z] * side[y])
+    if towards <= 0.05:
+        return 0.0
+    edge = 0.04 + blur
+    x_share = _smooth_step(0.62 + edge, 0.62 - edge, abs(across / towards))
+    y_share = _smooth_step(0.34 + edge, 0.34 - edge, abs(along / towards))
+    return x_share * y_share
 
 
 @kernel
@@ -304,11 +346,12 @@ def material_of(
     elif k == METAL:
         _copy(palette[STEEL], albedo)
         scale = fractal_noise(rest[0], rest[1], rest[2], 14.0, 4, slope, scratch)
+        brush = _brushed(rest, bump, slope)
         for c in range(3):
-            albedo[c] *= 0.75 + 0.5 * scale
+            albedo[c] *= (0.82 + 0.5 * scale) * (0.82 + 0.36 * brush)
         cover = _rust_layer(rest, rust, palette, albedo, bump, slope, scratch)
-        metallic = 0.75 * (1.0 - cover)
-        roughness = 0.42 + 0.2 * scale + 0.45 * cover
+        metallic = 0.85 * (1.0 - cover)
+        roughness = 0.30 + 0.2 * scale + 0.55 * cover
         gloss = 1.0 - 0.6 * cover
         veil = 0.5 * (1.0 - np.exp(-1.4 * dust))
         _blend(albedo, palette[DUST], veil)
@@ -340,6 +383,8 @@ def shade(
     eye: Vectors,
     key: Vectors,
     key_color: Vectors,
+    radiance: Vectors,
+    box: float,
     up: Vectors,
     palette: Vectors,
     lit: Vectors,
@@ -350,14 +395,23 @@ def shade(
 
     kind (s,), as named above; position, normal, rest (s, 3); stain, dust, rust, layer (s,), the last the
     place between the back (0) and the front (1) of the rim; color (s, 3), linear, of the paint or of parts
-    that show their own; is_own (s,), whether it is from a material of the input; own_roughness, own_metallic,
-    occlusion (s,), of such parts; key (3,) towards the key light; lit (s,) its visible share; sky_light
-    (s, 3) mean radiance over the
-    cosine-weighted hemisphere. palette (9, 3), linear, by the rows named above.
+    that show their own; is_own (s,), whether it is from a material of the input; own_roughness,
+    own_metallic, occlusion (s,), of such parts; key (3,) towards the key light; lit (s,) its visible share;
+    radiance (3, 3) and box, see `lights.Light`; sky_light (s, 3) mean radiance over the cosine-weighted
+    hemisphere. palette (9, 3), linear, by the rows named above.
     """
     albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     n, view, env = np.empty(3), np.empty(3), np.empty(3)
+    reflected, side = np.empty(3), np.empty(3)
     f0 = 0.04
+    whole, width = 0.0, 0.0
+    for c in range(3):
+        y, z = (c + 1) % 3, (c + 2) % 3
+        side[c] = up[y] * key[z] - up[z] * key[y]
+        width += side[c] * side[c]
+        whole += radiance[1, c] * _OPEN_SHARE
+    for c in range(3):
+        side[c] /= max(np.sqrt(width), 1e-9)
     for i in range(len(kind)):
         roughness, gloss, metallic = material_of(
             kind[i], rest[i], up, stain[i], dust[i], rust[i], layer[i], color[i], is_own[i],
@@ -383,9 +437,14 @@ def shade(
             vl += view[c] * key[c]
         nv = max(nv, 0.04)
         for c in range(3):
-            up_reflected += up[c] * (2.0 * nv * n[c] - view[c])
-        _sky(up_reflected, env)
-        openness = (sky_light[i, 0] + sky_light[i, 1] + sky_light[i, 2]) / 2.6
+            reflected[c] = 2.0 * nv * n[c] - view[c]
+            up_reflected += up[c] * reflected[c]
+        _sky(up_reflected, radiance, env)
+        openness = (sky_light[i, 0] + sky_light[i, 1] + sky_light[i, 2]) / whole
+        if box > 0.0:
+            mirrored = box * _soft_box(reflected, key, side, 0.5 * roughness * roughness)
+            for c in range(3):
+                env[c] += mirrored * lit[i]
         specular = 0.0
         if nl > 0.0 and lit[i] > 0.0:
             half = np.sqrt(max(1e-9, 2.0 + 2.0 * vl))
