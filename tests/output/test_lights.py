@@ -29,15 +29,12 @@ def test_no_two_lights_look_the_same() -> None:
             assert np.abs(one - other)[model].mean() > 4.0
 
 
-def test_evening_is_warm_and_the_sun_casts_a_darker_shadow_than_an_overcast_sky() -> None:
+def test_evening_is_warm_and_an_overcast_sky_is_cool() -> None:
     def warmth(light: str) -> float:
         red, _, blue, _ = drawn(light, paint=(0.5, 0.5, 0.5))[25:55, 35:60].mean(axis=(0, 1))
         return float(red / blue)
 
     assert warmth("evening") > 1.2 * warmth("studio") > 1.2 * warmth("overcast")
-    black = {light: drawn(light) for light in ("daylight", "overcast")}
-    beside = drawn("daylight", has_ground=False)[:, :, 3] == 0
-    assert black["daylight"][beside, 3].max() > 1.3 * black["overcast"][beside, 3].max()
 
 
 @pytest.mark.parametrize("name", [name for name, color in BACKGROUNDS.items() if color is not None])
