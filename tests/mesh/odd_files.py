@@ -543,7 +543,7 @@ def _gltf() -> Iterator[OddFile]:
     yield odd(
         "colour_infinite",
         _gltf_of([positions, flat.astype("<u2"), endless], ["VEC3", "SCALAR", "VEC3"], tinted),
-        notes=("W-NONFINITE",),
+        notes=("W-COLORS", "W-NONFINITE"),
     )
     interleaved = np.zeros((8, 8), "<f4")
     interleaved[:, 3:6] = positions

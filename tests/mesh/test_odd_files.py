@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from tests.fuzz.files import flaw_of_surface
 from tests.mesh.odd_files import OddFile, cube, gltf_cube, odd_files
 from weathercoat.errors import AccessError, MissingFileError, SecurityError, WeathercoatError
+from weathercoat.mesh.formats import obj
 from weathercoat.mesh.read import read_surface
 
 CASES = odd_files()
@@ -87,7 +89,11 @@ def test_a_material_library_out_of_the_folder_is_not_even_looked_for(
 ) -> None:
     (tmp_path / "a.obj").write_text(f"mtllib ../x.mtl\nmtllib {tmp_path}/y.mtl\nmtllib z.mtl\n" + cube())
     looked_at = []
-    is_file = Path.is_file
-    monkeypatch.setattr(Path, "is_file", lambda path: looked_at.append(path.name) or is_file(path))
+
+    def look(path: Path, folder: Path) -> NoReturn:
+        looked_at.append(path.name)
+        raise FileNotFoundError
+
+    monkeypatch.setattr(obj, "read_library", look)
     assert {note.code: note.count for note in read_surface(tmp_path / "a.obj").notes}["W-MATERIAL"] == 3
     assert looked_at == ["z.mtl"]

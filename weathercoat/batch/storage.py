@@ -17,7 +17,8 @@ from typing import Any, BinaryIO
 from urllib.parse import unquote, urlsplit
 
 from weathercoat.errors import AccessError, LimitError, ModelError, OutputError, WeathercoatError
-from weathercoat.mesh.beside import files_beside
+from weathercoat.mesh.beside import files_beside, inside
+from weathercoat.mesh.formats.mtl import picture_names
 from weathercoat.mesh.read import MAX_BYTES
 from weathercoat.output.folder import REPORT
 
@@ -47,14 +48,14 @@ def fetch(url: str, folder: Path, format: str | None = None) -> Path:
         _copy(files, place, path)
         beside = files_beside(path.read_bytes(), name, format)
         parent = place.partition("?")[0].rpartition("/")[0]
-        for other in beside.read:
+        wanted = [*beside.read, *beside.noticed]
+        for other in wanted:  # which libraries of materials make longer
             if files.exists(f"{parent}/{other}"):  # reading says what is missing
                 (folder / other).parent.mkdir(parents=True, exist_ok=True)
                 _copy(files, f"{parent}/{other}", folder / other)
-        for other in beside.noticed:
-            if files.exists(f"{parent}/{other}"):
-                (folder / other).parent.mkdir(parents=True, exist_ok=True)
-                (folder / other).touch()
+                if other.lower().endswith(".mtl"):
+                    shown = inside(picture_names((folder / other).read_bytes()))
+                    wanted += [name for name in shown if name not in wanted]
     return path
 
 

@@ -16,8 +16,8 @@ _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.*\S)[ \t]*$", re.MULTILINE)
 
 
 class Beside(NamedTuple):
-    """Relative paths of files beside a model: `read` are read with it; of `noticed`, libraries of materials
-    and pictures, it only matters whether they are there.
+    """Relative paths of files beside a model: those of `read` hold its geometry; those of `noticed`, libraries
+    of materials and pictures, may be missing.
     """
 
     read: list[str]
@@ -33,11 +33,11 @@ def files_beside(data: bytes, name: str, format: str | None = None) -> Beside:
         suffix = Path(name).suffix.lower().removeprefix(".")
         kind = format.lower().removeprefix(".") if format else sniff.identify(data, suffix)[0]
         if kind == "obj":
-            return Beside([], _inside(decode_names(_LIBRARY.findall(normalise(data)))))
+            return Beside([], inside(decode_names(_LIBRARY.findall(normalise(data)))))
         if kind in ("gltf", "glb"):
             text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data[:4] == b"glTF" else data
             content = json.loads(text.decode("utf-8-sig"))
-            return Beside(*(_inside(_uris(content.get(key, []))) for key in ("buffers", "images")))
+            return Beside(*(inside(_uris(content.get(key, []))) for key in ("buffers", "images")))
     except (WeathercoatError, ValueError, TypeError, AttributeError, RecursionError):
         pass
     return Beside([], [])
@@ -48,7 +48,7 @@ def _uris(entries: list[dict[str, object]]) -> list[str]:
     return [unquote(uri) for uri in uris if isinstance(uri, str) and not uri.startswith("data:")]
 
 
-def _inside(names: list[str]) -> list[str]:
+def inside(names: list[str]) -> list[str]:
     """The names, with `/` between folders, that stay in the folder of the model."""
     paths = [(name, Path(name.replace("\\", "/").removeprefix("./"))) for name in names]
     return [

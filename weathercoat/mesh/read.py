@@ -24,6 +24,7 @@ from weathercoat.errors import (
 )
 from weathercoat.mesh.beside import files_beside
 from weathercoat.mesh.formats import sniff
+from weathercoat.mesh.formats.mtl import picture_names
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.repair import repair
 from weathercoat.mesh.surface import Surface
@@ -70,18 +71,25 @@ def name_of(path: Path) -> str:
 
 
 def side_files(path: Path) -> list[Path]:
-    """The files beside a model that hold parts of its geometry: the buffers of a .gltf; sorted, and only
-    those that are there. Whatever is wrong with the model or with them, reading it tells.
+    """The files beside a model that are read with it: buffers, libraries of materials, pictures; sorted, and
+    only those that are there. Whatever is wrong with the model or with them, reading it tells.
     """
-    if path.suffix.lower() != ".gltf":
-        return []
-    try:
-        names = files_beside(path.read_bytes(), path.name).read
-    except OSError:
+    if path.suffix.lower() not in (".gltf", ".obj"):
         return []
     folder = path.parent.resolve()
-    beside = {(folder / name).resolve() for name in names}
-    return sorted(file for file in beside if file.is_relative_to(folder) and file.is_file())
+
+    def found(names: list[str]) -> set[Path]:
+        files = {(folder / name).resolve() for name in names}
+        return {file for file in files if file.is_relative_to(folder) and file.is_file()}
+
+    try:
+        beside = files_beside(path.read_bytes(), path.name)
+        files = found([*beside.read, *beside.noticed])
+        for library in [file for file in files if file.suffix.lower() == ".mtl"]:
+            files |= found(picture_names(library.read_bytes()))
+    except (OSError, ValueError):
+        return []
+    return sorted(files)
 
 
 def read_stream(

@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 
 from weathercoat.compile import kernel
 from weathercoat.errors import CorruptError, Note, SecurityError, UnsupportedError
+from weathercoat.mesh.formats.mtl import read_library
 from weathercoat.mesh.formats.polygons import Polygons
 from weathercoat.mesh.formats.text import Lines, decode_names, join_continued, normalise, pack
+from weathercoat.mesh.materials import SourceMaterial
+from weathercoat.mesh.surface import Part
 
 PASSED_OVER = (
     "mtllib", "usemap", "maplib", "mg", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm",
@@ -39,13 +42,19 @@ def read_obj(data: bytes, folder: Path | None) -> Polygons:
     f = _lines_of(lines, "f", "fo")
     positions, colors = _vertices(lines, v)
     _check_passed_over(lines, v, vt, vn)
-    corners, texture, sizes, notes = _faces(lines, f, v, vt, vn)
+    indices, sizes, notes = _faces(lines, f, v, vt, vn)
     face_group, groups = _groups(lines, f)
+    materials, missing = _materials(lines, folder)
+    face_part, parts = _parts(lines, f, list(materials))
     polygons = Polygons(
         positions=positions,
-        corners=corners,
+        corners=np.where(indices[:, 0] < 0, -1, indices[:, 0]),
         sizes=sizes,
-        uv=_corner_uv(lines, vt, texture),
+        uv=_corner_uv(lines, vt, indices[:, 1]),
+        normals=_corner_normals(lines, vn, indices[:, 2]),
+        face_part=face_part,
+        parts=parts,
+        materials=tuple(materials.values()),
         face_group=face_group,
         groups=groups,
         colors=colors,
@@ -53,7 +62,7 @@ def read_obj(data: bytes, folder: Path | None) -> Polygons:
     )
     polygons.drop_illegal()
     polygons.tidy_attributes()
-    polygons.notes.extend(_missing_materials(lines, folder))
+    polygons.notes.extend(missing)
     return polygons
 
 
@@ -126,8 +135,10 @@ def _vertices(lines: Lines, v: NDArray[np.int64]) -> tuple[NDArray[np.float64], 
 
 def _faces(
     lines: Lines, f: NDArray[np.int64], v: NDArray[np.int64], vt: NDArray[np.int64], vn: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], list[Note]]:
-    """Vertex and texture index of each corner, from 0, -1 for the illegal index 0; corners of each face."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64], list[Note]]:
+    """Indices of vertex, texture coordinate and normal of each corner, from 0, negative where there is none
+    or an illegal one; corners of each face.
+    """
     indices = _indices(lines, f, v, vt, vn)
     lost = indices[:, 1] == -1
     # A file whose normals were stripped keeps the indices of all of them.
@@ -137,7 +148,7 @@ def _faces(
     if lost.any():
         text = "corners name a texture coordinate or a normal that does not exist"
         notes.append(Note("W-BADINDEX", int(lost.sum()), text))
-    return np.where(indices[:, 0] < 0, -1, indices[:, 0]), indices[:, 1], lines.fields[f], notes
+    return indices, lines.fields[f], notes
 
 
 def _indices(
@@ -181,11 +192,49 @@ def _corner_uv(lines: Lines, vt: NDArray[np.int64], texture: NDArray[np.int64]) 
     return uv
 
 
+def _corner_normals(
+    lines: Lines, vn: NDArray[np.int64], normal: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    has = (normal >= 0) & (normal < len(vn))
+    if not has.any():
+        return None
+    normals = np.zeros((len(normal), 3))
+    normals[has] = lines.numbers(vn).reshape(-1, 3)[normal[has]]
+    return normals
+
+
+def _parts(
+    lines: Lines, f: NDArray[np.int64], materials: list[str]
+) -> tuple[NDArray[np.int32] | None, tuple[Part, ...]]:
+    """A part per face, of its object (or group, where the file names no objects) and its material."""
+    named = {word: _switches(lines, word) for word in ("o", "g", "usemtl")}
+    switches, names = named["o"] if any(named["o"][1]) else named["g"]
+    shown, shown_names = named["usemtl"]
+    if not any(names) and not any(shown_names):
+        return None, ()
+    numbers = {name: number for number, name in enumerate(materials)}
+    pairs = np.stack([np.searchsorted(switches, f), np.searchsorted(shown, f)], axis=1)
+    used, first, face_part = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    rank = np.empty(len(order), np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    names, shown_names = ["", *names], ["", *shown_names]
+    parts = [Part(names[i] or "default", numbers.get(shown_names[j], -1)) for i, j in used[order].tolist()]
+    number: dict[Part, int] = {}
+    place = np.array([number.setdefault(part, len(number)) for part in parts], np.int32)
+    return place[rank[face_part.reshape(-1)]], tuple(number)
+
+
+def _switches(lines: Lines, keyword: str) -> tuple[NDArray[np.int64], list[str]]:
+    """The lines of a keyword, and the name on each."""
+    switches = np.flatnonzero(lines.keyword == pack(keyword))
+    return switches, decode_names([b" ".join(lines.text(line).split()) for line in switches.tolist()])
+
+
 def _groups(lines: Lines, f: NDArray[np.int64]) -> tuple[NDArray[np.int32], tuple[str, ...]]:
     """A group per face: its material where the file names any, else its group, else its object."""
     for keyword in ("usemtl", "g", "o"):
-        switches = np.flatnonzero(lines.keyword == pack(keyword))
-        names = decode_names([b" ".join(lines.text(line).split()) for line in switches.tolist()])
+        switches, names = _switches(lines, keyword)
         if any(names):
             break
     else:
@@ -204,26 +253,38 @@ def number_groups(switch: NDArray[np.int64], names: list[str]) -> tuple[NDArray[
     return number[switch], tuple(place) or ("default",)
 
 
-def _missing_materials(lines: Lines, folder: Path | None) -> list[Note]:
-    if folder is None:
-        return []
-    missing = []
-    for line in np.flatnonzero(lines.keyword == pack("mtllib")).tolist():
+def _materials(lines: Lines, folder: Path | None) -> tuple[dict[str, SourceMaterial], list[Note]]:
+    """The materials of the libraries beside the model, by name, and notes on what is not there."""
+    materials: dict[str, SourceMaterial] = {}
+    libraries, pictures = [], []
+    for line in np.flatnonzero(lines.keyword == pack("mtllib")).tolist() if folder is not None else ():
         (name,) = decode_names([lines.text(line).strip()])
-        path = Path(name.replace("\\", "/").removeprefix("./"))
-        outside = path.is_absolute() or ".." in path.parts or ":" in name
-        if outside or not _is_file(folder / path):
-            missing.append(name)
-    if not missing:
-        return []
-    return [Note("W-MATERIAL", len(missing), f"material library {missing[0]!r} is not beside the model")]
+        path = library_path(name)
+        try:
+            if path is None:
+                raise OSError("leads out of the model's folder")
+            assert folder is not None
+            found, missing = read_library(folder / path, folder)
+        except (OSError, ValueError):
+            libraries.append(name)
+            continue
+        materials |= found
+        pictures += missing
+    notes = []
+    if libraries:
+        what = f"material library {libraries[0]!r} is not beside the model"
+        notes.append(Note("W-MATERIAL", len(libraries), what))
+    if pictures:
+        what = f"pictures are not beside the model: {pictures[0]!r}"
+        notes.append(Note("W-MATERIAL", len(pictures), what))
+    return materials, notes
 
 
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
+def library_path(name: str) -> Path | None:
+    """The path of a material library from the model's folder; None where it leads out of that."""
+    path = Path(name.replace("\\", "/").removeprefix("./"))
+    outside = path.is_absolute() or ".." in path.parts or ":" in name or "\0" in name
+    return None if outside else path
 
 
 ABSENT = -2

@@ -77,6 +77,7 @@ def read_ply(data: bytes) -> Polygons:
         corners=corners,
         sizes=sizes,
         uv=_corner_uv(table, corners, sizes),
+        normals=_corner_normals(table["vertex"], corners),
         face_group=np.zeros(len(sizes), np.int32),
         colors=_colors(vertex),
         single_precision=order != "=" and vertex["x"].type == "f4",
@@ -326,6 +327,15 @@ def _corner_uv(
             per_vertex = np.stack([vertex[u].values, vertex[v].values], axis=1).astype(np.float64)
             return per_vertex[np.clip(corners, 0, len(per_vertex) - 1)]
     return None
+
+
+def _corner_normals(vertex: dict[str, Column], corners: NDArray[np.int64]) -> NDArray[np.float64] | None:
+    """The normals of the vertices, at the corners."""
+    columns = [vertex.get(name) for name in ("nx", "ny", "nz")]
+    if any(column is None or column.is_list or not len(column.values) for column in columns):
+        return None
+    normals = np.stack([column.values for column in columns if column is not None], axis=1)
+    return normals.astype(np.float64)[np.clip(corners, 0, len(normals) - 1)]
 
 
 @kernel
