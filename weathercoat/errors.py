@@ -232,6 +232,13 @@ class StrictError(SurfaceError):
     remedy = "repair the model, or run without --strict"
 
 
+class TextureCoordinatesError(SurfaceError):
+    """The model has no texture coordinates that maps can be made on."""
+
+    code = "E-UV"
+    remedy = "give --atlas, which lays out new ones"
+
+
 class LimitError(WeathercoatError):
     """A limit of size, faces, memory or time."""
 

@@ -297,12 +297,12 @@ def _shaded(
     shade(
         s.kind, s.position, s.normal, s.rest, s.stain, s.dust, s.rust, s.layer, s.color, s.is_own,
         s.roughness, s.metallic, s.occlusion, camera.position, lighting.key, np.array(light.key_color),
-        light.sky(), light.box, lighting.up, _palette(parameters), smooth_lit, smooth_sky, color,
+        light.sky(), light.box, lighting.up, make_palette(parameters), smooth_lit, smooth_sky, color,
     )  # fmt: skip
     return color[follows]
 
 
-def _palette(parameters: PictureParameters) -> Vectors:
+def make_palette(parameters: PictureParameters) -> Vectors:
     """The colours that `shade` reads, (9, 3), linear."""
     palette = np.empty((9, 3))
     palette[PRIMER], palette[STEEL] = to_linear(parameters.primer), to_linear(parameters.metal)
