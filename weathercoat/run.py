@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.compile import Compiling, remove_unused, watch_compiling
 from weathercoat.config.load import LoadedConfig
@@ -308,12 +309,7 @@ def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | No
         )
         surface = surface.with_notes(Note("W-GROUP", len(idle), what))
 
-    def is_painted(group: str) -> bool:
-        wanted = not only or any(fnmatch.fnmatchcase(group, pattern) for pattern in only)
-        return wanted and not any(fnmatch.fnmatchcase(group, pattern) for pattern in excluded)
-
-    painted_groups = np.array([is_painted(group) for group in surface.groups])
-    keep = painted_groups[surface.face_group]
+    keep = painted_faces(surface, config)
     if keep.all():
         return surface, None
     if not keep.any():
@@ -323,6 +319,18 @@ def split_paint(surface: Surface, config: Config) -> tuple[Surface, Surface | No
             remedy=f"the model's groups are {', '.join(surface.groups)}",
         )
     return surface.select_faces(keep), surface.select_faces(~keep)
+
+
+def painted_faces(surface: Surface, config: Config) -> NDArray[np.bool_]:
+    """Whether each face of a model carries paint, (m,)."""
+    only, excluded = config.paint.only, config.paint.excluded
+
+    def is_painted(group: str) -> bool:
+        wanted = not only or any(fnmatch.fnmatchcase(group, pattern) for pattern in only)
+        return wanted and not any(fnmatch.fnmatchcase(group, pattern) for pattern in excluded)
+
+    painted_groups = np.array([is_painted(group) for group in surface.groups])
+    return painted_groups[surface.face_group]
 
 
 def prepare_simulation(

@@ -30,6 +30,7 @@ print("LOADED", code, *loaded)
         ["remesh", "--help"],
         ["inspect", "--help"],
         ["render", "--help"],
+        ["bake", "--help"],
         ["verify", "--help"],
         ["compare", "--help"],
         ["baseline", "--help"],

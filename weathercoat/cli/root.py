@@ -24,6 +24,7 @@ SUBCOMMANDS = (
     "inspect",
     "remesh",
     "render",
+    "bake",
     "verify",
     "compare",
     "schema",

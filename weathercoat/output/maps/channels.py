@@ -137,7 +137,9 @@ def quantised(kind: MapKind, planes: Planes, source: Indices, bits: int) -> NDAr
     return out.reshape(rows, columns, -1)
 
 
-def as_floats(kind: MapKind, planes: Planes, source: Indices, factors: Mapping[int, float]) -> NDArray[np.float16]:
+def as_floats(
+    kind: MapKind, planes: Planes, source: Indices, factors: Mapping[int, float]
+) -> NDArray[np.float16]:
     """Half floats for the texels (r, w), (r, w, channels), multiplied by the `factors` of planes; what is a
     direction is moved to 0 to 1, as in PNG.
     """

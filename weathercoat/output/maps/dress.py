@@ -69,11 +69,11 @@ def dress(
 ) -> None:
     """Fill the planes (N_PLANES, r w) at `texels` (k,), but for normals and occlusion.
 
-    own_color (k, 3), own_orm (k, 3): of the input's materials at the texels, linear; shows_own (m,): whether
-    paint on a face of the input shows them; has_material (m,), is_painted (m,): of its faces, as texel_size
-    (m,), the side of a texel in sizes. thickness of the film and groove, half the width that a closed crack is
-    drawn with, in sizes; paint (3,): the film's linear colour; palette: as in `shading`. The rest: of
-    `raster`, `locate` and `film`, flat.
+    own_color (k, 3), own_orm (k, 3): of the input's materials at the texels, linear; shows_own (m,):
+    whether paint on a face of the input shows them; has_material (m,), is_painted (m,): of its faces, as
+    texel_size (m,), the side of a texel in sizes. thickness of the film and groove, half the width that a
+    closed crack is drawn with, in sizes; paint (3,): the film's linear colour; palette: as in `shading`.
+    The rest: of `raster`, `locate` and `film`, flat.
     """
     albedo, bump, slope, scratch = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     place, color, n, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -129,7 +129,7 @@ def dress(
             if not is_own:
                 for x in range(3):
                     color[x] = paint[x]
-        roughness, gloss, metalness = material_of(
+        roughness, _, metalness = material_of(
             kind, place, up, stain, dust, rust, 1.0, color, is_own, own_orm[k, 1], own_orm[k, 2],
             palette, albedo, bump, slope, scratch,
         )  # fmt: skip
@@ -158,8 +158,13 @@ def dress(
             weight = min(1.0, np.float64(height[i]) / thickness)
             if weight > 0.0:
                 _add_slope(f, weights[i], normals, film_normals[s], b, weight, is_back[i], n, normal, bump)
-        elif covering[g] >= 0 and (is_crack_beside(sides, covering[g]) or not is_end_beside(sides, covering[g])):
-            crack = 1.0
+        elif covering[g] >= 0:
+            # seen past film that is still there, but for what the smoothed outline leaves free
+            over = covering[g]
+            is_end = sides[over, 0] == END or sides[over, 1] == END or sides[over, 2] == END
+            is_crack = sides[over, 0] == CRACK or sides[over, 1] == CRACK or sides[over, 2] == CRACK
+            if is_crack or not is_end:
+                crack = 1.0
         for c in range(3):
             planes[RED + c, i] = albedo[c]
             planes[SLOPE_X + c, i] = bump[c]
@@ -174,18 +179,6 @@ def dress(
         planes[SEPARATED, i] = separated
         planes[AGE, i] = min(1.0, since / age) if age > 0.0 else 0.0
         planes[HEIGHT, i] = level
-
-
-@kernel
-def is_crack_beside(sides: NDArray[np.uint8], f: int) -> bool:
-    """Whether a crack runs along a side of the film face f."""
-    return sides[f, 0] == CRACK or sides[f, 1] == CRACK or sides[f, 2] == CRACK
-
-
-@kernel
-def is_end_beside(sides: NDArray[np.uint8], f: int) -> bool:
-    """Whether the film ends at a side of the film face f."""
-    return sides[f, 0] == END or sides[f, 1] == END or sides[f, 2] == END
 
 
 @kernel

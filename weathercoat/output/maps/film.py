@@ -236,7 +236,9 @@ def find_seen(
             nx, ny, nz = n[0] / squared, n[1] / squared, n[2] / squared
             for k in range(first[g], first[g + 1]):
                 f = reach[k]
-                distance, p, q, facing = _meet(film, faces[f, 0], faces[f, 1], faces[f, 2], px, py, pz, nx, ny, nz)
+                distance, p, q, facing = _meet(
+                    film, faces[f, 0], faces[f, 1], faces[f, 2], px, py, pz, nx, ny, nz
+                )
                 if distance > best:
                     best = distance
                     seen[row, column] = f

@@ -63,7 +63,7 @@ def make_layout(surface: Surface) -> Layout:
     if (low < 0).any() or (low[:, 0] >= _COLUMNS).any():
         u, v = low[((low < 0).any(axis=1) | (low[:, 0] >= _COLUMNS)).argmax()].astype(int)
         raise TextureCoordinatesError(
-            f"faces lie in the square {u}, {v} of texture space, and tiles have columns 0 to 9 and rows from 0",
+            f"faces lie in the square {u}, {v} of texture space; tiles are in columns 0 to 9, rows from 0",
             file=surface.name,
         )
     number = (FIRST_TILE + low[:, 0] + _COLUMNS * low[:, 1]).astype(np.int64)
@@ -89,7 +89,9 @@ def _face_sets(
     names: list[str] = []
     for i in used:
         given = surface.materials[i].name if i >= 0 else ""
-        name = "".join(c if c.isalnum() or c in "-+" else "_" for c in given).strip("_") or f"material_{i + 1}"
+        name = (
+            "".join(c if c.isalnum() or c in "-+" else "_" for c in given).strip("_") or f"material_{i + 1}"
+        )
         names.append(name if name.lower() not in [n.lower() for n in names] else f"{name}_{i + 1}")
     return [(name, material == i) for name, i in zip(names, used, strict=True)]
 

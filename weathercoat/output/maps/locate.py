@@ -33,9 +33,7 @@ class Ground(NamedTuple):
     tree: ClosestTree
 
 
-def make_ground(
-    vertices: Vectors, faces: Indices, input_vertices: Vectors, input_faces: Indices
-) -> Ground:
+def make_ground(vertices: Vectors, faces: Indices, input_vertices: Vectors, input_faces: Indices) -> Ground:
     """The simulated mesh, and where to begin to look for points of each face of the input."""
     tree = make_closest_tree(vertices, faces)
     centres = input_vertices[input_faces].mean(axis=1)

@@ -20,9 +20,13 @@ _ADLER = 65521
 
 
 def pack_rows(
-    rows: NDArray[np.uint8] | NDArray[np.uint16], above: NDArray[np.uint8] | NDArray[np.uint16] | None, *, level: int
+    rows: NDArray[np.uint8] | NDArray[np.uint16],
+    above: NDArray[np.uint8] | NDArray[np.uint16] | None,
+    *,
+    level: int,
 ) -> tuple[bytes, int, int]:
-    """Rows (r, w, c) as PNG filters and compresses them; `above` (w, c) is the row before, None for the first.
+    """Rows (r, w, c) as PNG filters and compresses them; `above` (w, c) is the row before, None for the
+    first.
 
     Returns the compressed bytes, which end at a whole byte, and the Adler-32 checksum and the length of what
     was compressed.
@@ -37,14 +41,16 @@ def pack_rows(
     np.subtract(raw[:1], before, out=filtered[:1, 1:])
     np.subtract(raw[1:], raw[:-1], out=filtered[1:, 1:])
     packer = zlib.compressobj(level, zlib.DEFLATED, -15)
-    content = packer.compress(filtered) + packer.flush(zlib.Z_FULL_FLUSH)
-    return content, zlib.adler32(filtered), filtered.size
+    content = packer.compress(filtered.data) + packer.flush(zlib.Z_FULL_FLUSH)
+    return content, zlib.adler32(filtered.data), filtered.size
 
 
 class PngWriter:
     """Writes one PNG to a binary stream: its head, bands from top to bottom, and its end."""
 
-    def __init__(self, stream: BinaryIO, width: int, height: int, channels: int, bits: int, *, is_srgb: bool) -> None:
+    def __init__(
+        self, stream: BinaryIO, width: int, height: int, channels: int, bits: int, *, is_srgb: bool
+    ) -> None:
         self._stream = stream
         self._adler = 1
         stream.write(_SIGNATURE)

@@ -34,12 +34,10 @@ class PngSink:
     def __init__(self, path: Path, kind: MapKind, width: int, height: int, bits: int) -> None:
         self._kind, self._bits = kind, bits
         self._stream = path.open("wb")
-        self._writer = PngWriter(
-            self._stream, width, height, len(kind.channels), bits, is_srgb=kind.is_color
-        )
+        self._writer = PngWriter(self._stream, width, height, len(kind.channels), bits, is_srgb=kind.is_color)
 
     def prepare(self, planes: Planes, source: Indices, above: Indices | None) -> tuple[bytes, int, int]:
-        """The rows of texels whose values are at `source` (r, w) in the planes, below the row `above` (w,)."""
+        """The texels whose values are at `source` (r, w) in the planes, below the row `above` (w,)."""
         before = None
         if above is not None:
             before = quantised(self._kind, planes, above[None], self._bits)[0]
