@@ -246,6 +246,7 @@ def test_a_model_from_standard_input(sign: Path, expected: Expected, tmp_path: P
     assert piped == direct and len(piped) > 4
     run_here(sign, tmp_path / "direct")
     reports = [json.loads((tmp_path / name / "run.json").read_text("utf-8")) for name in ("piped", "direct")]
+    assert [report.pop("model") for report in reports] == ["-", MODEL]
     assert reports[0].pop("inputs") == {"-": reports[1].pop("inputs")[MODEL]}
     assert all(report.pop("files") for report in reports)
     assert reports[0] == reports[1]

@@ -76,10 +76,8 @@ class FinishedRun:
         Raises UsageError where it is not found, or is another than the run was made of, and what
         `read_surface` raises.
         """
-        inputs = self.report["inputs"]
-        # the others, if any, are the buffers of a .gltf
-        name = min(inputs, key=lambda name: (not name.lower().endswith(".gltf"), name))
-        digest = inputs[name]["sha256"]
+        name = self.report["model"]
+        digest = self.report["inputs"][name]["sha256"]
         places = [self.path.parent / name, Path(name)] if model is None else [model]
         for place in places:
             if place.is_file() and sha256(place) == digest:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -25,7 +25,7 @@ from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface, side_files
 from weathercoat.mesh.remesh import RemeshParameters, remesh
-from weathercoat.mesh.surface import Surface
+from weathercoat.mesh.surface import Place, Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
 from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder, kept_in
 from weathercoat.output.meshes import write_mesh
@@ -193,8 +193,9 @@ def _mesh(intake: _Intake, checkpoint: Checkpoint | None, folder: Path) -> Surfa
     """The surface to simulate: the one that the checkpoint is of, or as the config wants it."""
     config = intake.plan.loaded.config
     if checkpoint and config.remesh:
-        return read_kept_surface(folder)
-    return remesh_painted(intake.painted, config)
+        kept = read_kept_surface(folder)
+        return replace(kept, parts=intake.surface.parts, materials=intake.surface.materials)
+    return placed_on(intake.surface, intake.painted, remesh_painted(intake.painted, config))
 
 
 def _report(
@@ -284,6 +285,19 @@ def report_notes(
     if strict and notes:
         first = notes[0]
         raise StrictError(f"{first.code}({first.count}): {first.message}", file=name)
+
+
+def placed_on(model: Surface, painted: Surface, meshed: Surface) -> Surface:
+    """The surface `meshed`, made of the part `painted` of a model, with its places on the whole model."""
+    place = meshed.place
+    if place is None:  # it is the painted part as it was: each vertex lies at a corner of a face
+        corner = np.zeros(len(meshed.vertices), np.int64)
+        corner[meshed.faces.ravel()] = np.arange(meshed.faces.size)
+        place = Place((corner // 3).astype(np.int32), np.eye(3)[corner % 3])
+    if painted is not model:  # parts are left out by whole groups
+        kept = np.flatnonzero(np.isin(model.face_group, painted.face_group)).astype(np.int32)
+        place = Place(kept[place.face], place.barycentric)
+    return replace(meshed, place=place)
 
 
 def remesh_painted(painted: Surface, config: Config) -> Surface:

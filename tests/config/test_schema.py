@@ -75,7 +75,7 @@ def test_sections_are_frozen_and_closed(section: type[Section]) -> None:
         ("remesh.faces", 20_000_001),
         ("remesh.crease_angle", 0),
         ("remesh.crease_angle", 180.1),
-        ("ageing.steps", 0),
+        ("ageing.steps", -1),
         ("ageing.duration", 0),
         ("ageing.duration", math.inf),
         ("tension.rate", -1),

@@ -177,7 +177,7 @@ rules:
     config: crackle
     set:
       rust: {rat: 3}
-      ageing.steps: 0
+      ageing.steps: -1
 """
     assert problems(folder, text) == [
         (1, "config"),

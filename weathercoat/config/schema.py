@@ -197,7 +197,11 @@ class Ageing(Section):
     """The time that a run covers. Rates are per age, so steps set accuracy and cost, not the paint."""
 
     steps: Whole = parameter(
-        1000, "Number of steps that the run is divided into", symbol="N", ge=1, le=10_000_000
+        1000,
+        "Number of steps that the run is divided into; 0 records the intact start alone",
+        symbol="N",
+        ge=0,
+        le=10_000_000,
     )
     duration: Real = parameter(1.0, "Age that the run covers", unit="ages", ge=1e-9, le=1000)
 

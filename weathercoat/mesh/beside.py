@@ -16,8 +16,8 @@ _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.*\S)[ \t]*$", re.MULTILINE)
 
 
 class Beside(NamedTuple):
-    """Relative paths of files beside a model: those of `read` hold its geometry; those of `noticed`, libraries
-    of materials and pictures, may be missing.
+    """Relative paths of files beside a model: those of `read` hold geometry; those of `noticed`, which are
+    libraries of materials and pictures, may be missing.
     """
 
     read: list[str]

@@ -71,7 +71,9 @@ def read_checkpoint(folder: Path) -> Checkpoint | None:
 
 
 def write_surface(folder: Path, surface: Surface) -> None:
-    """Keep a surface beside the checkpoint; raises OSError where that cannot be written."""
+    """Keep a surface, but for its parts and materials, beside the checkpoint; raises OSError where that
+    cannot be written.
+    """
     arrays: dict[str, NDArray[Any]] = {
         "vertices": surface.vertices,
         "faces": surface.faces,
@@ -81,6 +83,10 @@ def write_surface(folder: Path, surface: Surface) -> None:
         arrays["uv"] = surface.uv
     if surface.colors is not None:
         arrays["colors"] = surface.colors
+    if surface.normals is not None:
+        arrays["normals"] = surface.normals
+    if surface.face_part is not None:
+        arrays["face_part"] = surface.face_part
     if surface.place is not None:
         arrays["place_face"] = surface.place.face
         arrays["place_barycentric"] = surface.place.barycentric
@@ -112,6 +118,8 @@ def read_kept_surface(folder: Path) -> Surface:
             up=tuple(about["up"]),
             notes=tuple(Note(*note) for note in about["notes"]),
             place=place,
+            normals=arrays.get("normals"),
+            face_part=arrays.get("face_part"),
             name=about["name"],
             format=about["format"],
         )

@@ -20,7 +20,10 @@ PROPERTY_TYPES = {"uchar": "u1", "int": "<i4", "float": "<f4", "double": "<f8"}
 TYPE_NAMES = {np.dtype(code): name for name, code in PROPERTY_TYPES.items()}
 CORNER_LIST = "property list uchar int vertex_indices"
 CORNER_FIELDS: list[tuple[Any, ...]] = [("count", "u1"), ("vertex_indices", "<i4", (3,))]
-HEADER_LIMIT = 65536
+TEXTURE_LIST = "property list uchar float texcoord"
+TEXTURE_FIELDS: list[tuple[Any, ...]] = [("texcoord_count", "u1"), ("texcoord", "<f4", (6,))]
+_IN_LISTS = {field[0] for field in CORNER_FIELDS + TEXTURE_FIELDS}
+HEADER_LIMIT = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,14 @@ class PlyArrays:
     """Content of a PLY file.
 
     comments: the header's comment lines; vertex, face: the named properties, each (n,) or (m,), in the types
-    of the file; faces: int32 (m, 3).
+    of the file; faces: int32 (m, 3); texture: float32 (m, 3, 2), the texture coordinates of corners, or None.
     """
 
     comments: tuple[str, ...]
     vertex: dict[str, NDArray[Any]]
     face: dict[str, NDArray[Any]]
     faces: NDArray[np.int32]
+    texture: NDArray[np.float32] | None = None
 
     def vectors(self, *names: str) -> NDArray[Any]:
         """The named vertex properties side by side, (n, len(names))."""
@@ -50,12 +54,14 @@ def write_ply(
     colors: ArrayLike | None = None,
     scalars: Mapping[str, NDArray[Any]] | None = None,
     face_scalars: Mapping[str, NDArray[Any]] | None = None,
+    texture: ArrayLike | None = None,
     comments: Iterable[str] = (),
 ) -> None:
     """Write a triangle mesh as binary little-endian PLY to a path or a binary stream.
 
     vertices (n, 3), faces (m, 3); normals (n, 3), written as floats; colors uint8 (n, 3), sRGB; scalars (n,)
-    and face_scalars (m,), named, each of type bool, uint8, int32, float32 or float64 and written as such.
+    and face_scalars (m,), named, each of type bool, uint8, int32, float32 or float64 and written as such;
+    texture (m, 3, 2), texture coordinates of corners, written as floats in a list `texcoord` of each face.
     Raises ValueError where lengths or types do not fit, OSError where the target cannot be written.
     """
     positions = np.asarray(vertices, np.float64)
@@ -70,14 +76,20 @@ def write_ply(
         columns |= dict(zip(("red", "green", "blue"), colors.T, strict=True))
     columns |= scalars or {}
     vertex_table = _pack(columns, len(positions), [])
-    face_table = _pack(face_scalars or {}, len(corners), CORNER_FIELDS)
+    lists = CORNER_FIELDS if texture is None else CORNER_FIELDS + TEXTURE_FIELDS
+    face_table = _pack(face_scalars or {}, len(corners), lists)
     face_table["count"] = 3
     face_table["vertex_indices"] = corners
+    if texture is not None:
+        face_table["texcoord_count"] = 6
+        face_table["texcoord"] = np.asarray(texture, np.float32).reshape(-1, 6)
 
     header = ["ply", "format binary_little_endian 1.0"]
     header += ["comment " + " ".join(comment.split()) for comment in comments]
     header += [f"element vertex {len(positions)}", *_property_lines(vertex_table)]
-    header += [f"element face {len(corners)}", CORNER_LIST, *_property_lines(face_table), "end_header", ""]
+    header += [f"element face {len(corners)}", CORNER_LIST]
+    header += [] if texture is None else [TEXTURE_LIST]
+    header += [*_property_lines(face_table), "end_header", ""]
     content = ("\n".join(header).encode("ascii", "backslashreplace"), vertex_table, face_table)
     if isinstance(target, (str, Path)):
         with Path(target).open("wb") as stream:
@@ -116,7 +128,12 @@ def read_ply_arrays(path: Path | str) -> PlyArrays:
     faces = np.ascontiguousarray(face_table["vertex_indices"], np.int32)
     if face_count and (np.any(face_table["count"] != 3) or faces.min() < 0 or faces.max() >= vertex_count):
         raise CorruptError("a face is no triangle or refers to no vertex", file=str(path))
-    return PlyArrays(comments, _unpack(vertex_table), _unpack(face_table), faces)
+    texture = None
+    if "texcoord" in (face_table.dtype.names or ()):
+        if face_count and np.any(face_table["texcoord_count"] != 6):
+            raise CorruptError("a face has not three texture coordinates", file=str(path))
+        texture = np.ascontiguousarray(face_table["texcoord"], np.float32).reshape(-1, 3, 2)
+    return PlyArrays(comments, _unpack(vertex_table), _unpack(face_table), faces, texture)
 
 
 def color_bytes(colors: ArrayLike) -> NDArray[np.uint8]:
@@ -144,8 +161,7 @@ def _property_lines(table: NDArray[Any]) -> list[str]:
     """Header lines of the table's scalar properties."""
     assert table.dtype.fields is not None
     types = {name: field[0] for name, field in table.dtype.fields.items()}
-    corners = {field[0] for field in CORNER_FIELDS}
-    return [f"property {TYPE_NAMES[kind]} {name}" for name, kind in types.items() if name not in corners]
+    return [f"property {TYPE_NAMES[kind]} {name}" for name, kind in types.items() if name not in _IN_LISTS]
 
 
 def _write_all(stream: BinaryIO, content: tuple[bytes, NDArray[Any], NDArray[Any]]) -> None:
@@ -167,6 +183,8 @@ def _parse_elements(lines: list[str], path: Path) -> tuple[int, np.dtype[Any], i
                 elements[-1][2].append((name, PROPERTY_TYPES[kind]))
             case _ if line == CORNER_LIST and elements:
                 elements[-1][2].extend(CORNER_FIELDS)
+            case _ if line == TEXTURE_LIST and elements:
+                elements[-1][2].extend(TEXTURE_FIELDS)
             case _:
                 raise FormatError(f"unexpected line {line[:60]!r} in the PLY header", file=str(path))
     if [name for name, _, _ in elements] != ["vertex", "face"] or elements[1][2][:2] != CORNER_FIELDS:
@@ -180,6 +198,5 @@ def _parse_elements(lines: list[str], path: Path) -> tuple[int, np.dtype[Any], i
 
 def _unpack(table: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """The table's scalar properties, each contiguous and of native byte order."""
-    corners = {field[0] for field in CORNER_FIELDS}
-    names = [name for name in table.dtype.names or () if name not in corners]
+    names = [name for name in table.dtype.names or () if name not in _IN_LISTS]
     return {name: np.ascontiguousarray(table[name], table.dtype[name].newbyteorder("=")) for name in names}

@@ -189,6 +189,7 @@ def make_report(
         "config": dict(config),
         "seed": seed,
         "versions": versions(),
+        "model": next(iter(inputs)),
         "inputs": {name: {"sha256": digest} for name, digest in inputs.items()},
         "meshes": _rounded(meshes),
         "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],

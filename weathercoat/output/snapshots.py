@@ -7,14 +7,25 @@ painted part is the paint, and the metal lies beneath it. Removing film never ha
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.errors import FormatError
-from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas, vertex_normals
+from weathercoat.mesh.surface import (
+    Indices,
+    Part,
+    Place,
+    Surface,
+    Vectors,
+    face_areas,
+    make_surface,
+    vertex_normals,
+)
 from weathercoat.output.glb import Material, Node, Sheet, write_glb
 from weathercoat.output.ply import PlyArrays, color_bytes, read_ply_arrays, write_ply
 from weathercoat.output.sheets import METAL_CREASE, make_sheet, srgb_to_linear, surface_nodes
@@ -29,7 +40,8 @@ FILM_CREASE = float(np.radians(60.0))
 # Of the thickness: open edges of the front draw back, so that a closed crack shows as a groove.
 BEVEL = 0.5
 SUBSTRATE, FILM = 0, 1
-TITLE = "weathercoat snapshot 1"
+TITLE, FIRST_TITLE = "weathercoat snapshot 2", "weathercoat snapshot 1"
+_MOST_NAMES = 1 << 18  # characters of the names of groups and objects in a header
 PAINT = Material("paint", metallic=0.0, roughness=0.5, double_sided=True)
 PRIMER = Material("primer", metallic=0.0, roughness=0.8, double_sided=True)
 METAL = Material("metal", metallic=0.2, roughness=0.8, double_sided=True)
@@ -40,15 +52,23 @@ def write_snapshot_ply(folder: Path | str, snapshot: Snapshot, stem: str) -> Pat
 
     Properties of a vertex: position (double), normal, colour (sRGB bytes), and the scalars part (0 metal, 1
     film), rust, dust, separated, adhesion, separation_age, bare, origin (number of the metal's vertex, which
-    for the metal is its own). Of a face: part, and origin (number of the metal's face). The metal comes first
-    and lies a hair under the film; what does not apply to it is 0. Scalars are 32-bit floats. Raises OSError
-    where the file cannot be written.
+    for the metal is its own), rest_x, rest_y, rest_z (position at rest, double), and the place on the input:
+    input_face, and input_v, input_w, the weights of the second and third of its corners. Of a face: part,
+    origin (number of the metal's face), and, as far as the model has them, texcoord (u v of each corner),
+    group and object, whose names are comments. A vertex has the model's own colour as base_red, base_green,
+    base_blue, where it has one. The metal comes first and lies a hair under the film; what does not apply to
+    it is 0. Scalars are 32-bit floats. Raises OSError where the file cannot be written.
     """
     path = Path(folder) / f"{stem}.ply"
     metal, film = len(snapshot.substrate_vertices), len(snapshot.film_vertices)
     depth = hair(snapshot)
     film_normals = vertex_normals(snapshot.film_vertices, snapshot.film_faces)
     no_value = np.zeros(metal)
+    origin = np.concatenate([np.arange(metal, dtype=np.int32), snapshot.film_origin]).astype(np.int32)
+    face_origin = np.concatenate(
+        [np.arange(len(snapshot.substrate_faces), dtype=np.int32), snapshot.film_face]
+    ).astype(np.int32)
+    inherited = _inherited(snapshot, origin, face_origin)
     write_ply(
         path,
         np.concatenate([set_in(snapshot, depth), snapshot.film_vertices]),
@@ -63,25 +83,25 @@ def write_snapshot_ply(folder: Path | str, snapshot: Snapshot, stem: str) -> Pat
             "adhesion": _floats(no_value, snapshot.adhesion),
             "separation_age": _floats(no_value, snapshot.separation_age),
             "bare": np.concatenate([snapshot.bare, np.zeros(film, np.bool_)]),
-            "origin": np.concatenate([np.arange(metal, dtype=np.int32), snapshot.film_origin]).astype(
-                np.int32
-            ),
+            "origin": origin,
+            **inherited.vertex,
         },
         face_scalars={
             "part": np.repeat(
                 np.array([SUBSTRATE, FILM], np.uint8),
                 [len(snapshot.substrate_faces), len(snapshot.film_faces)],
             ),
-            "origin": np.concatenate(
-                [np.arange(len(snapshot.substrate_faces), dtype=np.int32), snapshot.film_face]
-            ).astype(np.int32),
+            "origin": face_origin,
+            **inherited.face,
         },
+        texture=inherited.texture,
         comments=(
             TITLE,
             f"step {snapshot.step}",
             f"age {float(snapshot.age)!r}",
             f"hair {depth!r}",
             "part 0 is the metal, set in by the hair along its normals; part 1 is the film",
+            *inherited.comments,
         ),
     )
     return path
@@ -90,8 +110,9 @@ def write_snapshot_ply(folder: Path | str, snapshot: Snapshot, stem: str) -> Pat
 def read_snapshot_ply(path: Path | str) -> Snapshot:
     """Read a snapshot that `write_snapshot_ply` wrote.
 
-    The film's positions come back exactly, the metal's to round-off, scalars and normals as 32-bit floats,
-    colours as bytes. Raises AccessError, FormatError or CorruptError.
+    Positions come back exactly, scalars, normals and texture coordinates as 32-bit floats, colours as bytes;
+    the surface without its shading normals, and its parts without materials. Raises AccessError, FormatError
+    or CorruptError.
     """
     ply = read_ply_arrays(path)
     try:
@@ -196,21 +217,125 @@ def _used_sheet(
     )
 
 
+class _Inherited(NamedTuple):
+    """What vertices and faces of a file have from the model; see `write_snapshot_ply`."""
+
+    vertex: dict[str, NDArray[Any]]
+    face: dict[str, NDArray[Any]]
+    texture: NDArray[np.float32] | None
+    comments: list[str]
+
+
+def _inherited(snapshot: Snapshot, origin: Indices, face_origin: Indices) -> _Inherited:
+    """What the vertices and faces of these origins have from the model."""
+    rest = snapshot.substrate_vertices[origin]
+    vertex: dict[str, NDArray[Any]] = dict(zip(("rest_x", "rest_y", "rest_z"), rest.T, strict=True))
+    face: dict[str, NDArray[Any]] = {}
+    comments: list[str] = []
+    surface = snapshot.surface
+    if surface is None:
+        return _Inherited(vertex, face, None, comments)
+    if surface.place is not None:
+        weights = surface.place.barycentric[origin].astype(np.float32)
+        vertex |= {
+            "input_face": surface.place.face[origin],
+            "input_v": weights[:, 1],
+            "input_w": weights[:, 2],
+        }
+    if surface.colors is not None:
+        colors = color_bytes(surface.colors[origin, :3])
+        vertex |= dict(zip(("base_red", "base_green", "base_blue"), colors.T, strict=True))
+    if surface.groups != ("default",):
+        face["group"] = surface.face_group[face_origin]
+        comments += _names("group", surface.groups)
+    if surface.face_part is not None:
+        face["object"] = surface.face_part[face_origin]
+        comments += [f"object_material {n} {part.material}" for n, part in enumerate(surface.parts)]
+        comments += _names("object", [part.name for part in surface.parts])
+    texture = None if surface.uv is None else surface.uv[face_origin].astype(np.float32)
+    return _Inherited(vertex, face, texture, comments)
+
+
+def _names(kind: str, names: Sequence[str]) -> list[str]:
+    """Comments that name what faces refer to by number, as far as a header has room."""
+    comments, room = [], _MOST_NAMES
+    for number, name in enumerate(names):
+        room -= len(name) + len(kind) + 12
+        if room < 0:
+            break
+        comments.append(f"{kind} {number} {name}")
+    return comments
+
+
+def _read_surface(ply: PlyArrays, metal: int, metal_faces: int, vertices: Vectors, faces: Indices) -> Surface:
+    """The surface at the start in a file's arrays: that of the metal, which comes first."""
+    vertex = {name: values[:metal] for name, values in ply.vertex.items()}
+    face = {name: values[:metal_faces] for name, values in ply.face.items()}
+    place = colors = None
+    if "input_face" in vertex:
+        v, w = (vertex[name].astype(np.float64) for name in ("input_v", "input_w"))
+        place = Place(vertex["input_face"], np.stack([1.0 - v - w, v, w], axis=1))
+    if "base_red" in vertex:
+        base = np.stack([vertex[f"base_{c}"] for c in ("red", "green", "blue")], axis=1) / 255.0
+        colors = np.column_stack([base, np.ones(metal)])
+    return make_surface(
+        vertices,
+        faces,
+        face_group=face.get("group"),
+        groups=_read_names(ply.comments, "group", face.get("group")) or ("default",),
+        uv=None if ply.texture is None else ply.texture[:metal_faces].astype(np.float64),
+        colors=colors,
+        place=place,
+        face_part=face.get("object"),
+        parts=_read_parts(ply.comments, face.get("object")),
+    )
+
+
+def _read_names(comments: Sequence[str], kind: str, numbers: Indices | None) -> tuple[str, ...]:
+    """The names that comments give, as many as the largest of the numbers needs."""
+    if numbers is None:
+        return ()
+    known = dict(c.removeprefix(f"{kind} ").partition(" ")[::2] for c in comments if c.startswith(f"{kind} "))
+    count = max(int(numbers.max(initial=-1)) + 1, len(known))
+    return tuple(_unescaped(known.get(str(n), f"{kind}_{n}")) for n in range(count))
+
+
+def _read_parts(comments: Sequence[str], numbers: Indices | None) -> tuple[Part, ...]:
+    shown = _read_names(comments, "object_material", numbers)
+    names = _read_names(comments, "object", numbers)
+    return tuple(
+        Part(name, int(material) if material.lstrip("-").isdigit() else -1)
+        for name, material in zip(names, shown, strict=True)
+    )
+
+
+def _unescaped(text: str) -> str:
+    """A name as it was before the header's ASCII."""
+    return re.sub(
+        r"\\(?:x([0-9a-f]{2})|u([0-9a-f]{4})|U([0-9a-f]{8}))",
+        lambda match: chr(int(match[1] or match[2] or match[3], 16)),
+        text,
+    )
+
+
 def _floats(metal: Vectors, film: Vectors) -> NDArray[np.float32]:
     return np.concatenate([metal, film]).astype(np.float32)
 
 
 def _unpack(ply: PlyArrays) -> Snapshot:
     """The snapshot in a file's arrays; KeyError, ValueError or IndexError where it is none."""
-    if ply.comments[0] != TITLE:
+    if ply.comments[0] not in (TITLE, FIRST_TITLE):
         raise ValueError(ply.comments[0])
-    facts = dict(comment.split(" ", 1) for comment in ply.comments[1:])
+    facts = dict(comment.partition(" ")[::2] for comment in ply.comments[1:4])
     metal = int(np.sum(ply.vertex["part"] == SUBSTRATE))
     metal_faces = int(np.sum(ply.face["part"] == SUBSTRATE))
     positions = ply.vectors("x", "y", "z")
     normals = ply.vectors("nx", "ny", "nz").astype(np.float64)
     colors = ply.vectors("red", "green", "blue") / 255.0
     rust = ply.vertex["rust"].astype(np.float64)
+    vertices = positions[:metal] + float(facts["hair"]) * normals[:metal]
+    if "rest_x" in ply.vertex:
+        vertices = ply.vectors("rest_x", "rest_y", "rest_z")[:metal]
     return Snapshot(
         step=int(facts["step"]),
         age=float(facts["age"]),
@@ -223,11 +348,12 @@ def _unpack(ply: PlyArrays) -> Snapshot:
         separation_age=ply.vertex["separation_age"][metal:].astype(np.float64),
         adhesion=ply.vertex["adhesion"][metal:].astype(np.float64),
         film_color=colors[metal:],
-        substrate_vertices=positions[:metal] + float(facts["hair"]) * normals[:metal],
+        substrate_vertices=vertices,
         substrate_normals=normals[:metal],
         substrate_faces=ply.faces[:metal_faces],
         substrate_rust=rust[:metal],
         dust=ply.vertex["dust"][:metal].astype(np.float64),
         bare=ply.vertex["bare"][:metal] != 0,
         substrate_color=colors[:metal],
+        surface=_read_surface(ply, metal, metal_faces, vertices, ply.faces[:metal_faces]),
     )

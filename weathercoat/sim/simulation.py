@@ -116,7 +116,7 @@ class Simulation:
 
     def age_after(self, steps: int) -> float:
         """The age after a number of steps; that after the same step of a longer run has the same bits."""
-        return float(Fraction(str(self.duration)) * steps / self.steps)
+        return float(Fraction(str(self.duration)) * steps / max(self.steps, 1))
 
     def step(self, count: int = 1) -> None:
         """Age by `count` steps at once: age, separate, fracture, flake, deform, stain."""

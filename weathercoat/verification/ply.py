@@ -17,11 +17,13 @@ from weathercoat.verification.findings import BrokenFileError
 
 _MAGIC = b"ply\nformat binary_little_endian 1.0\n"
 _END = b"end_header\n"
-_LONGEST_HEADER = 1 << 16
+_LONGEST_HEADER = 1 << 20
 _SIZES = {"uchar": 1, "int": 4, "float": 4, "double": 8}
 _CORNERS = "list uchar int vertex_indices"
 _CORNERS_SIZE = 13  # the count, and three corners
-_TITLE = "weathercoat snapshot 1"
+_TEXTURE = "list uchar float texcoord"
+_TEXTURE_SIZE = 25  # the count, and two numbers for each of three corners
+_TITLE = "weathercoat snapshot 2"
 
 # The properties of a snapshot, as its header lists them, and the same as fields of a record.
 _VERTEX_LINES = (
@@ -29,23 +31,30 @@ _VERTEX_LINES = (
     *("uchar red", "uchar green", "uchar blue", "uchar part", "float rust", "float dust"),
     *("uchar separated", "float adhesion", "float separation_age", "uchar bare", "int origin"),
 )
-_VERTEX_FIELDS = np.dtype(
-    [
-        ("position", "<f8", (3,)),
-        ("normal", "<f4", (3,)),
-        ("color", "u1", (3,)),
-        ("part", "u1"),
-        ("rust", "<f4"),
-        ("dust", "<f4"),
-        ("separated", "u1"),
-        ("adhesion", "<f4"),
-        ("separation_age", "<f4"),
-        ("bare", "u1"),
-        ("origin", "<i4"),
-    ]
+_VERTEX_FIELDS: list[tuple[Any, ...]] = [
+    ("position", "<f8", (3,)),
+    ("normal", "<f4", (3,)),
+    ("color", "u1", (3,)),
+    ("part", "u1"),
+    ("rust", "<f4"),
+    ("dust", "<f4"),
+    ("separated", "u1"),
+    ("adhesion", "<f4"),
+    ("separation_age", "<f4"),
+    ("bare", "u1"),
+    ("origin", "<i4"),
+]
+# What vertices and faces have from the model, after these, as far as the model has it.
+_VERTEX_MORE = (
+    (("double rest_x", "double rest_y", "double rest_z"), ("rest", "<f8", (3,))),
+    (("int input_face",), ("input_face", "<i4")),
+    (("float input_v", "float input_w"), ("input_weights", "<f4", (2,))),
+    (("uchar base_red", "uchar base_green", "uchar base_blue"), ("base_color", "u1", (3,))),
 )
-_FACE_LINES = (_CORNERS, "uchar part", "int origin")
-_FACE_FIELDS = np.dtype([("count", "u1"), ("corners", "<i4", (3,)), ("part", "u1"), ("origin", "<i4")])
+_FACE_LINES = ("uchar part", "int origin")
+_FACE_FIELDS: list[tuple[Any, ...]] = [("count", "u1"), ("corners", "<i4", (3,))]
+_TEXTURE_FIELDS: list[tuple[Any, ...]] = [("texture_count", "u1"), ("texture", "<f4", (6,))]
+_FACE_MORE = ((("int group",), ("group", "<i4")), (("int object",), ("object", "<i4")))
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,8 @@ class PlySnapshot:
 
     Vertices: positions (n, 3), normals (n, 3), colors (n, 3), and (n,) each: part, rust, dust, separated,
     adhesion, separation_age, bare, origin. Faces: faces int32 (m, 3), face_part, face_origin (m,).
+    vertex_more, face_more: what they have from the model by name: rest (n, 3), input_face (n,), input_weights
+    (n, 2), base_color (n, 3); texture (m, 6), group (m,), object (m,).
     """
 
     step: int
@@ -87,6 +98,8 @@ class PlySnapshot:
     faces: NDArray[np.int32]
     face_part: NDArray[np.uint8]
     face_origin: NDArray[np.int32]
+    vertex_more: dict[str, NDArray[Any]]
+    face_more: dict[str, NDArray[Any]]
 
 
 def read_ply(content: bytes) -> Ply:
@@ -130,15 +143,25 @@ def read_ply(content: bytes) -> Ply:
 def read_snapshot(content: bytes) -> PlySnapshot:
     """A snapshot's PLY; raises BrokenFileError where it is none."""
     ply = read_ply(content)
-    if ply.vertex_lines != _VERTEX_LINES or ply.face_lines != _FACE_LINES:
+    has_texture = ply.face_lines[1:2] == (_TEXTURE,)
+    begin = (_CORNERS, _TEXTURE) if has_texture else (_CORNERS,)
+    vertex_fields = _more_fields(ply.vertex_lines, _VERTEX_LINES, _VERTEX_MORE)
+    face_fields = _more_fields(ply.face_lines, begin + _FACE_LINES, _FACE_MORE)
+    if vertex_fields is None or face_fields is None:
         raise BrokenFileError("its properties are not those of a snapshot")
     if not ply.comments or ply.comments[0] != _TITLE:
         raise BrokenFileError(f"its first comment is not {_TITLE!r}")
-    vertex = np.frombuffer(content, _VERTEX_FIELDS, ply.vertex_count, ply.vertex_start)
-    face = np.frombuffer(content, _FACE_FIELDS, ply.face_count, ply.face_start)
+    own: list[tuple[Any, ...]] = [("part", "u1"), ("origin", "<i4")]
+    lists = _FACE_FIELDS + _TEXTURE_FIELDS if has_texture else _FACE_FIELDS
+    vertex_type = np.dtype([*_VERTEX_FIELDS, *vertex_fields])
+    face_type = np.dtype([*lists, *own, *face_fields])
+    vertex = np.frombuffer(content, vertex_type, ply.vertex_count, ply.vertex_start)
+    face = np.frombuffer(content, face_type, ply.face_count, ply.face_start)
     wrong = np.flatnonzero(face["count"] != 3)
     if len(wrong):
         raise BrokenFileError(f"face {wrong[0]} has {face['count'][wrong[0]]} corners")
+    if has_texture and np.any(face["texture_count"] != 6):
+        raise BrokenFileError("a face has not three texture coordinates")
 
     def column(name: str) -> NDArray[Any]:
         return np.ascontiguousarray(vertex[name])
@@ -161,7 +184,26 @@ def read_snapshot(content: bytes) -> PlySnapshot:
         faces=np.ascontiguousarray(face["corners"]),
         face_part=np.ascontiguousarray(face["part"]),
         face_origin=np.ascontiguousarray(face["origin"]),
+        vertex_more={field[0]: column(field[0]) for field in vertex_fields},
+        face_more={
+            name: np.ascontiguousarray(face[name])
+            for name in ([field[0] for field in face_fields] + (["texture"] if has_texture else []))
+        },
     )
+
+
+def _more_fields(
+    lines: tuple[str, ...], first: tuple[str, ...], more: tuple[tuple[tuple[str, ...], tuple[Any, ...]], ...]
+) -> list[tuple[Any, ...]] | None:
+    """The fields of the properties after the `first` ones; None where these are others, or in disorder."""
+    if lines[: len(first)] != first:
+        return None
+    rest, fields = lines[len(first) :], []
+    for names, field in more:
+        if rest[: len(names)] == names:
+            rest = rest[len(names) :]
+            fields.append(field)
+    return None if rest else fields
 
 
 def read_triangles(content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
@@ -184,6 +226,9 @@ def _row_size(lines: tuple[str, ...] | list[str]) -> int:
     """Bytes of the scalar properties of one row."""
     size = 0
     for line in lines:
+        if line == _TEXTURE:
+            size += _TEXTURE_SIZE
+            continue
         kind, _, name = line.partition(" ")
         if kind not in _SIZES or not name or " " in name:
             raise BrokenFileError(f"unexpected property {line[:40]!r} in the header")

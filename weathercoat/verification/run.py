@@ -23,6 +23,7 @@ from weathercoat.verification.film import Film, check_arrays, check_film
 from weathercoat.verification.findings import BrokenFileError, Finding, Ledger
 from weathercoat.verification.glb import Glb, read_glb
 from weathercoat.verification.history import check_history
+from weathercoat.verification.inherited import check_inherited
 from weathercoat.verification.listing import REPORT, Listing
 from weathercoat.verification.metal import Metal, check_same, make_metal
 from weathercoat.verification.ply import PlySnapshot, read_snapshot, read_triangles
@@ -114,7 +115,7 @@ class _Run:
         self.has_preview = take(report, "config.output.preview", bool)
         self.duration = take(report, "config.ageing.duration", float)
         self.last_step = take(report, "config.ageing.steps", int)
-        if self.last_step < 1 or not all(map(is_number, (self.last_step, *self.steps))):
+        if self.last_step < 0 or not all(map(is_number, (self.last_step, *self.steps))):
             raise BrokenFileError(
                 f"config.ageing.steps is {self.last_step}, or a snapshot is of no such step"
             )
@@ -129,6 +130,7 @@ class _Run:
         self.snapshots = 0
         self.other_faces = 0
         self.metal: Metal | None = None
+        self.first: PlySnapshot | None = None
         self.film: Film | None = None
 
     @property
@@ -216,7 +218,7 @@ class _Run:
 
     def _check_row(self, row: dict[str, Any], step: int) -> bool:
         """What a row of the report says by itself; true, or BrokenFileError where something is missing."""
-        told, own = take(row, "age", float), self.duration * (step / self.last_step)
+        told, own = take(row, "age", float), self.duration * (step / max(self.last_step, 1))
         self.ledger.expect(
             "ages",
             REPORT,
@@ -236,6 +238,8 @@ class _Run:
             return None
         if self.metal is None:
             return None
+        check_inherited(self.ledger, name, snapshot, self.metal, self.first)
+        self.first = self.first or snapshot
         counts = {
             "film_vertices": len(snapshot.part) - len(self.metal.vertices),
             "film_faces": len(snapshot.face_part) - len(self.metal.faces),
