@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from weathercoat.config.schema import LARGEST_SEED, Config, Section, Snapshots, parameters
+from weathercoat.config.schema import LARGEST_SEED, Config, Snapshots, parameters
+from weathercoat.config.section import Section
 
 
 def nested(key: str, value: Any) -> dict[str, Any]:

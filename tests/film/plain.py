@@ -37,6 +37,8 @@ class PlainState(NamedTuple):
     """The arrays of a `FilmState`, and tension_now (m,): the tension of every face at the age of the step."""
 
     adhesion: Vectors
+    adhesion_loss: Vectors
+    lift_gain: Vectors
     separated: NDArray[np.bool_]
     separation_age: Vectors
     is_tip: NDArray[np.bool_]
@@ -45,6 +47,7 @@ class PlainState(NamedTuple):
     tension_age: Vectors
     tension_cap: Vectors
     relief: Vectors
+    stress: Vectors
     fray_age: Vectors
     cohesion: Vectors
     lift_factor: Vectors
@@ -163,7 +166,7 @@ def find_overcome(
     convexity: float,
     per_valence: bool,
     lift_scale: float,
-    adhesion_loss: float,
+    age: float,
     face_tension: Vectors,
     is_uniform: bool,
     out: Indices,
@@ -171,7 +174,7 @@ def find_overcome(
     """Collect in out the attached vertices with `lift_scale` times their sum above their adhesion; returns
     how many.
 
-    Adhesion is that at the start less `adhesion_loss`, not below 0. Where the tension is the same everywhere,
+    Adhesion is that at the start less its loss, not below 0. Where the tension is the same everywhere,
     vertices round which nothing has moved keep the sum that they had at the start, `rest_lift`.
     """
     positions, tail, twin, half_edge, origin = (
@@ -202,7 +205,8 @@ def find_overcome(
                 face_tension,
                 per_valence,
             )
-        if lift_scale * total > max(adhesion[origin[v]] - adhesion_loss, 0.0):
+        o = origin[v]
+        if lift_scale * (total * state.lift_gain[o]) > max(adhesion[o] - state.adhesion_loss[o] * age, 0.0):
             out[found] = v
             found += 1
     return found
@@ -234,11 +238,11 @@ def find_separating(mesh: HalfEdgeMesh, state: PlainState, parameters: FilmParam
     p = parameters
     is_uniform = p.lift_tension == "drying"
     scale = p.lift_coefficient * (float(drying_tension(make_film_rules(p), age)) if is_uniform else 1.0)
-    weight = np.ones(len(mesh.alive)) if is_uniform else state.tension_now
+    weight = np.ones(len(mesh.alive)) if is_uniform else state.stress * state.tension_now
     found = np.empty(len(state.adhesion), np.int32)
     count = find_overcome(
         mesh, state, p.lift_convexity, p.lift_sum == "per_valence", scale,
-        p.adhesion_decay_rate * p.adhesion_base * age, weight, is_uniform, found,
+        age, weight, is_uniform, found,
     )  # fmt: skip
     return found[:count].copy()
 
@@ -427,10 +431,11 @@ def edge_overload(mesh: HalfEdgeMesh, state: PlainState, rules: FilmRules, h: in
     bond = min(cohesion_at(state, rules, h, age), cohesion_at(state, rules, g, age))
     if leads_on(mesh, state, rules, a, b) or leads_on(mesh, state, rules, b, a):
         bond *= rules.direction_factor
-        load = tension_across(mesh, state, rules, h // 3, a, b, age)
-        load += tension_across(mesh, state, rules, g // 3, a, b, age)
+        load = state.stress[h // 3] * tension_across(mesh, state, rules, h // 3, a, b, age)
+        load += state.stress[g // 3] * tension_across(mesh, state, rules, g // 3, a, b, age)
     else:
-        load = state.tension_now[h // 3] + state.tension_now[g // 3]
+        load = state.stress[h // 3] * state.tension_now[h // 3]
+        load += state.stress[g // 3] * state.tension_now[g // 3]
     return load / bond if bond > 0.0 else math.inf
 
 
@@ -472,7 +477,7 @@ def find_overloaded(
     many.
     """
     tail, twin, separated, is_tip = mesh.tail, mesh.twin, state.separated, state.is_tip
-    tension, cohesion, fray_age = state.tension_now, state.cohesion, state.fray_age
+    tension, cohesion, fray_age, stress = state.tension_now, state.cohesion, state.fray_age, state.stress
     most_frayed = math.exp(-rules.cohesion_decay_rate * age)
     found = 0
     for h in range(len(twin)):
@@ -486,7 +491,8 @@ def find_overloaded(
         least = min(cohesion[h], cohesion[g])
         if fray_age[h // 3] < age or fray_age[g // 3] < age:
             least *= most_frayed
-        if tension[h // 3] + tension[g // 3] <= least and not (is_tip[a] or is_tip[b]):
+        load = stress[h // 3] * tension[h // 3] + stress[g // 3] * tension[g // 3]
+        if load <= least and not (is_tip[a] or is_tip[b]):
             continue
         load = edge_overload(mesh, state, rules, h, age)
         if load > 1.0:

@@ -111,6 +111,8 @@ def _comment(parameter: Parameter) -> str:
 
 def _value(value: Any) -> str:
     """The value as YAML that reads back the same."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_value(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_value, value)) + "]"
     if value is False or value is True or value is None:

@@ -49,11 +49,13 @@ for _name, _pattern in (
 
 
 def read_document(data: bytes, where: str) -> dict[str, Item]:
-    """The mapping that a YAML file holds, empty for comments alone. Raises `ConfigError`."""
+    """The mapping that a YAML file holds, empty for comments alone; its lists are of items. Raises
+    `ConfigError`.
+    """
     if len(data) > LARGEST_FILE:
         raise ConfigError.at(where, f"larger than {LARGEST_FILE // 1024} KiB, this is no config")
     node = _compose(decode(data, where), where)
-    reader = _Reader(where)
+    reader = _Reader(where, keeps_lines=True)
     value = None if node is None else reader.read(node, "")
     if not reader.problems and value is not None and not isinstance(value, dict):
         reader.problems.append(ConfigProblem(where, 1, "", "must be a mapping of keys to values"))

@@ -245,7 +245,7 @@ def _wanted_presets(layers: Iterable[_Layer]) -> dict[str, _Origin]:
     for layer in layers:
         if "preset" in layer.values:
             item = layer.values["preset"]
-            names = item.value if isinstance(item.value, list) else [item.value]
+            names = without_lines(item.value if isinstance(item.value, list) else [item.value])
             last_first = dict.fromkeys(name for name in reversed(names) if isinstance(name, str))
             wanted = dict.fromkeys(reversed(last_first), _Origin(layer.where, item.line))
     return wanted
@@ -291,9 +291,41 @@ class _Merge:
             elif item.value is None and path != ("snapshots", "count"):
                 self.report(path, "has no value" + color_hint(path))
             else:
-                if is_section:
+                if is_section or isinstance(item.value, list):
                     self._forget_below(path)
-                target[name] = without_lines(item.value)
+                if isinstance(item.value, dict) and isinstance(target.get(name), list):
+                    self._change_entries(target[name], item.value, path, where)
+                else:
+                    self._note_lines(item.value, path, where)
+                    target[name] = without_lines(item.value)
+
+    def _change_entries(
+        self, entries: list[Any], items: dict[str, Item], above: KeyPath, where: str
+    ) -> None:
+        """Change entries of a list that are given by their numbers from 0, as `steering.0.multiply`."""
+        for number, item in items.items():
+            path = (*above, f"[{number}]")
+            self.origins[path] = _Origin(where, item.line)
+            if not number.isdecimal() or int(number) >= len(entries):
+                self.report(path, f"there is no such entry, of {len(entries)} from 0")
+                continue
+            entry = entries[int(number)]
+            if isinstance(item.value, dict) and isinstance(entry, dict):
+                for name, inner in item.value.items():
+                    self.origins[(*path, name)] = _Origin(where, inner.line)
+                    entry[name] = without_lines(inner.value)
+            else:
+                entries[int(number)] = without_lines(item.value)
+
+    def _note_lines(self, value: Any, path: KeyPath, where: str) -> None:
+        """Note where the parts of a list stand."""
+        if isinstance(value, list):
+            parts = [(f"[{i}]", part) for i, part in enumerate(value) if isinstance(part, Item)]
+        else:
+            parts = list(value.items()) if isinstance(value, dict) else []
+        for name, part in parts:
+            self.origins[(*path, name)] = _Origin(where, part.line)
+            self._note_lines(part.value, (*path, name), where)
 
     def _forget_below(self, path: KeyPath) -> None:
         """Drop the origins of what a value at `path` replaces as a whole."""

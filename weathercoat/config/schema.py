@@ -16,9 +16,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -27,21 +25,24 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 
+from weathercoat.config.section import (
+    SWITCH,
+    SWITCH_SCHEMA,
+    Names,
+    Real,
+    Section,
+    Switch,
+    Whole,
+    Words,
+    at_least_one_word,
+    parameter,
+    parse_switch,
+    require_number,
+)
+from weathercoat.config.steering import Steer
+
 VERSION = 1
 LARGEST_SEED = 2**63 - 1
-
-
-def require_number(value: object) -> object:
-    """Pydantic would read true as 1 and "3" as 3; a config that says so is a mistake."""
-    if isinstance(value, bool | str):
-        raise ValueError("must be a number")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError("must be a finite number")
-    return value
-
-
-def _at_least_one_word(value: object) -> object:
-    return (value,) if isinstance(value, str) else value
 
 
 def _parse_color(value: object) -> tuple[int, ...]:
@@ -64,19 +65,10 @@ def _parse_up(value: object) -> object:
     raise ValueError("must be auto, x, y, z, -x, -y, -z or three numbers that are not all 0")
 
 
-def _parse_switch(value: object) -> object:
-    """Off and on as YAML 1.1 reads them (booleans) and as YAML 1.2 does (words)."""
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, str) and value in _SWITCH:
-        return _SWITCH[value]
-    raise ValueError("must be true or false")
-
-
 def _parse_remesh(value: object) -> object:
     """A mapping as it is, {} for on, which means the defaults, and false for off."""
-    if isinstance(value, bool | str) and value in (True, False, *_SWITCH):
-        return {} if _parse_switch(value) else False
+    if isinstance(value, bool | str) and value in (True, False, *SWITCH):
+        return {} if parse_switch(value) else False
     return value
 
 
@@ -84,20 +76,10 @@ def _remesh_tag(value: object) -> str:
     return "off" if value is False else "mapping"
 
 
-_SWITCH = {"on": True, "yes": True, "off": False, "no": False}
-_SWITCH_SCHEMA = {"enum": [True, False, *_SWITCH]}
 _FORMAT_SCHEMA = {"type": "string", "enum": ["ply", "glb"]}
 
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
-Real = Annotated[float, BeforeValidator(require_number)]
-Whole = Annotated[int, BeforeValidator(require_number)]
 PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(require_number)] | None
-Switch = Annotated[bool, BeforeValidator(_parse_switch), WithJsonSchema(_SWITCH_SCHEMA)]
-Names = Annotated[
-    tuple[str, ...],
-    BeforeValidator(_at_least_one_word),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
 Color = Annotated[
     tuple[int, int, int],
     BeforeValidator(_parse_color),
@@ -115,26 +97,6 @@ Color = Annotated[
         }
     ),
 ]
-
-
-def parameter(
-    default: Any,
-    description: str,
-    *,
-    unit: str = "",
-    symbol: str = "",
-    alias: str | None = None,
-    **bounds: Any,
-) -> Any:
-    """A field with its unit, the paper's symbol where it has one, and bounds (`gt`, `ge`, `lt`, `le`)."""
-    extra: Any = {name: text for name, text in (("unit", unit), ("symbol", symbol)) if text}
-    return Field(default, description=description, alias=alias, json_schema_extra=extra or None, **bounds)
-
-
-class Section(BaseModel):
-    """A part of the config: immutable, and without unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
 
 class Model(Section):
@@ -497,7 +459,7 @@ class Output(Section):
 
     formats: Annotated[
         tuple[Literal["ply", "glb"], ...],
-        BeforeValidator(_at_least_one_word),
+        BeforeValidator(at_least_one_word),
         Field(min_length=1),
         WithJsonSchema(
             {"anyOf": [_FORMAT_SCHEMA, {"type": "array", "items": _FORMAT_SCHEMA, "minItems": 1}]}
@@ -509,7 +471,7 @@ class Output(Section):
 
 
 RemeshOrOff = Annotated[
-    Annotated[Remesh, Tag("mapping")] | Annotated[Literal[False], Tag("off"), WithJsonSchema(_SWITCH_SCHEMA)],
+    Annotated[Remesh, Tag("mapping")] | Annotated[Literal[False], Tag("off"), WithJsonSchema(SWITCH_SCHEMA)],
     Discriminator(_remesh_tag),
     BeforeValidator(_parse_remesh),
 ]
@@ -553,6 +515,9 @@ class Config(Section):
     snapshots: Snapshots = Snapshots()
     checkpoint: Checkpoint = Checkpoint()
     output: Output = Output()
+    steering: tuple[Steer, ...] = parameter(
+        (), "Parameters changed place by place and over time, one after the other; see docs/steering.md"
+    )
 
     def conflicts(self) -> list[tuple[str, str]]:
         """Values that are valid each but do not go together: (key, what is wrong)."""
@@ -591,6 +556,8 @@ class Parameter:
 
 def section_of(field: FieldInfo) -> type[Section] | None:
     """The section that a field holds, or None where it is a parameter."""
+    if get_origin(field.annotation) is tuple:
+        return None
     for kind in (field.annotation, *get_args(field.annotation)):
         while get_origin(kind) is Annotated:
             kind = get_args(kind)[0]
@@ -599,15 +566,29 @@ def section_of(field: FieldInfo) -> type[Section] | None:
     return None
 
 
+def entry_of(field: FieldInfo) -> type[Section] | None:
+    """The section of which a field holds a list, or None."""
+    if get_origin(field.annotation) is tuple:
+        kind = get_args(field.annotation)[0]
+        if isinstance(kind, type) and issubclass(kind, Section):
+            return kind
+    return None
+
+
 @cache
 def section_at(path: tuple[str, ...]) -> type[Section] | None:
-    """The section at a path of keys, all of the config for none; None for a parameter or unknown key."""
+    """The section at a path of keys, all of the config for none; None for a parameter or unknown key. An
+    entry of a list is `[0]`.
+    """
     section: type[Section] | None = Config
+    entry: type[Section] | None = None
     for name in path:
-        if section is None:
-            return None
-        fields = ((field.alias or key, field) for key, field in section.model_fields.items())
-        section = next((section_of(field) for key, field in fields if key == name), None)
+        if name.startswith("["):
+            section, entry = entry, None
+            continue
+        fields = () if section is None else section.model_fields.items()
+        field = next((field for key, field in fields if (field.alias or key) == name), None)
+        section, entry = (None, None) if field is None else (section_of(field), entry_of(field))
     return section
 
 
@@ -624,24 +605,33 @@ def parameters(section: type[Section] = Config, prefix: str = "") -> Iterator[Pa
             key=key,
             default=field.default,
             description=field.description or "",
-            kind=_describe_kind(field.annotation) + _describe_bounds(field.metadata),
+            kind=_words_in(field.metadata)
+            or _describe_kind(field.annotation) + _describe_bounds(field.metadata),
             unit=str(extra.get("unit", "")),
             symbol=str(extra.get("symbol", "")),
         )
 
 
+def _words_in(metadata: Iterable[Any]) -> str:
+    return next((words.text for words in metadata if isinstance(words, Words)), "")
+
+
 def _describe_kind(kind: Any) -> str:
     """What a parameter of the type `kind` accepts, in words."""
     origin, inner = get_origin(kind), [part for part in get_args(kind) if part is not type(None)]
+    if isinstance(kind, type) and issubclass(kind, Section):
+        return "mapping"
     if origin is Annotated:
-        return _describe_kind(inner[0]) + _describe_bounds(inner[1:])
+        return _words_in(inner[1:]) or _describe_kind(inner[0]) + _describe_bounds(inner[1:])
     if kind == get_args(Color)[0]:
         return '"#rrggbb" or [r, g, b]'
     if origin is Literal:
         return ", ".join(map(str, inner))
     if origin is tuple:
         many = "list of " if Ellipsis in inner else "three "
-        return many + _describe_kind(inner[0]).replace("number", "numbers").replace("name", "names")
+        return many + _describe_kind(inner[0]).replace("number", "numbers").replace("name", "names").replace(
+            "mapping", "mappings"
+        )
     if inner:
         return " or ".join(map(_describe_kind, inner))
     return {bool: "true, false", int: "whole number", float: "number", str: "name"}[kind]

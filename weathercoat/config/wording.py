@@ -72,7 +72,7 @@ def shortened(value: Any) -> str:
 def nearest_key(path: KeyPath) -> str:
     """The key that was meant: a sibling, the paper's symbol, or a key of that name in another section."""
     section = section_at(path[:-1])
-    name, prefix = path[-1], ".".join((*path[:-1], ""))
+    name, prefix = path[-1], ".".join((*path[:-1], "")).replace(".[", "[")
     if section is not None:
         siblings = [prefix + (field.alias or key) for key, field in section.model_fields.items()]
         match = difflib.get_close_matches(prefix + name, siblings, 1, cutoff=0.0)

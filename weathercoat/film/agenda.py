@@ -53,7 +53,7 @@ class Agenda(NamedTuple):
 
     fringe: int32 (n0,), of which counts[1] are in use, the attached vertices that are tested in every step.
     membership: int8 (n0,), OUTSIDE of it, TO_PACK, or PACKED, when the same rows of these, made by
-    `pack_hinges`, are up to date: hinges, int32 (n0, 8, 4), and sums, (n0, 3).
+    `pack_hinges`, are up to date: hinges, int32 (n0, 8, 4), and sums, (n0, 4).
 
     attached_corners: int8 (m,), corners that have not separated. face_centre: (m, 3), at rest.
     relief_distance: (m,), a crack at this distance or farther cannot lower the face's cap. marks: int64 (m,),
@@ -96,7 +96,7 @@ def make_agenda(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules) -> Agend
         fringe=np.empty(rest_count, np.int32),
         membership=np.zeros(rest_count, np.int8),
         hinges=np.empty((rest_count, PACKED_HINGES, 4), np.int32),
-        sums=np.empty((rest_count, 3)),
+        sums=np.empty((rest_count, 4)),
         attached_corners=np.sum(~state.separated[mesh.tail.reshape(-1, 3)], axis=1, dtype=np.int8),
         face_centre=(corner[:, 0] + corner[:, 1] + corner[:, 2]) / 3.0,
         relief_distance=_relief_distances(state, rules),
@@ -116,6 +116,11 @@ def _relief_distances(state: FilmState, rules: FilmRules) -> Vectors:
     relieved = left > 0.0
     distance[relieved] = -rules.shear_lag * np.log(left[relieved])
     return distance
+
+
+def forget_forecasts(agenda: Agenda) -> None:
+    """Have all tested at the next step, as after a change of what the film holds with."""
+    agenda.ages[:] = np.nan
 
 
 @kernel

@@ -96,11 +96,11 @@ def edge_overload(
     bond = min(cohesion_at(state, rules, h, later), cohesion_at(state, rules, g, later))
     if leads_on(mesh, state, rules, a, b) or leads_on(mesh, state, rules, b, a):
         bond *= rules.direction_factor
-        load = tension_across(mesh, state, rules, h // 3, a, b, age, later)
-        load += tension_across(mesh, state, rules, g // 3, a, b, age, later)
+        load = state.stress[h // 3] * tension_across(mesh, state, rules, h // 3, a, b, age, later)
+        load += state.stress[g // 3] * tension_across(mesh, state, rules, g // 3, a, b, age, later)
     else:
-        load = tension_until(state, rules, h // 3, age, later)
-        load += tension_until(state, rules, g // 3, age, later)
+        load = state.stress[h // 3] * tension_until(state, rules, h // 3, age, later)
+        load += state.stress[g // 3] * tension_until(state, rules, g // 3, age, later)
     return load / bond if bond > 0.0 else math.inf
 
 
@@ -164,7 +164,8 @@ def is_slack(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, h: int, age
     g = mesh.twin[h]
     if state.is_tip[mesh.tail[h]] or state.is_tip[mesh.tail[g]]:
         return False
-    return face_tension(state, rules, h // 3, age) + face_tension(state, rules, g // 3, age) <= 0.0
+    load = state.stress[h // 3] * face_tension(state, rules, h // 3, age)
+    return load + state.stress[g // 3] * face_tension(state, rules, g // 3, age) <= 0.0
 
 
 @kernel

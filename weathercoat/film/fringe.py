@@ -30,10 +30,10 @@ def find_in_fringe(
     """
     positions, tail, twin, half_edge = mesh.positions, mesh.tail, mesh.twin, mesh.half_edge
     separated, adhesion, rest_factor = state.separated, state.adhesion, state.lift_factor
+    adhesion_loss, gain = state.adhesion_loss, state.lift_gain
     fringe, membership, hinges, sums = agenda.fringe, agenda.membership, agenda.hinges, agenda.sums
     scale = rules.lift_coefficient * (1.0 if rules.lifts_by_face else drying_tension(rules, age))
     per_scale = 1.0 / (scale * (1.0 + SLACK)) if scale > 0.0 else math.inf
-    loss = rules.adhesion_loss_rate * age
     count = agenda.counts[FRINGE]
     i = 0
     while i < count:
@@ -42,10 +42,12 @@ def find_in_fringe(
             pack_hinges(
                 half_edge[v], tail, twin, separated, rest_factor, rules.lift_per_valence, i, hinges, sums
             )
+            sums[i, 1] *= gain[v]
             sums[i, 2] = adhesion[v]
+            sums[i, 3] = adhesion_loss[v]
             membership[v] = PACKED
         if membership[v] == PACKED:
-            enough = max(sums[i, 2] - loss, 0.0) * per_scale
+            enough = max(sums[i, 2] - sums[i, 3] * age, 0.0) * per_scale
             if bound_lift(positions, hinges, sums, i, rules.lift_convexity, enough) <= enough:
                 i += 1
                 continue
@@ -56,7 +58,7 @@ def find_in_fringe(
             sums[i] = sums[count]
             continue
         i += 1
-        if scale * lift_on(mesh, state, rules, v, age) > max(adhesion[v] - loss, 0.0):
+        if scale * lift_on(mesh, state, rules, v, age) > max(adhesion[v] - adhesion_loss[v] * age, 0.0):
             agenda.found[found] = v
             found += 1
     agenda.counts[FRINGE] = count

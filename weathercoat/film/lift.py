@@ -48,7 +48,7 @@ def lift_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, v: int, age:
 
     It is the sum over the half-edges opposite to the vertex of the sigmoid of their present bend, times the
     tension of their face where that lifts. A half-edge without a twin lifts as if flat, and a hinge whose
-    corners are all attached has not moved since the start. `lift_per_valence` scales the sum to six
+    corners are all attached has not moved since the start. The vertex's gain counts. `lift_per_valence` scales the sum to six
     half-edges, so that valence and rim do not matter.
     """
     positions, tail, twin, separated = mesh.positions, mesh.tail, mesh.twin, state.separated
@@ -66,7 +66,7 @@ def lift_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, v: int, age:
         else:
             factor = sigmoid(half_edge_bend(h, positions, tail, twin), rules.lift_convexity)
         if rules.lifts_by_face:
-            factor *= face_tension(state, rules, h // 3, age)
+            factor *= state.stress[h // 3] * face_tension(state, rules, h // 3, age)
         total += factor
         count += 1
         leaving = twin[prev_of(leaving)]
@@ -74,7 +74,7 @@ def lift_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, v: int, age:
             break
     if rules.lift_per_valence and count > 0:
         total *= 6.0 / count
-    return total
+    return total * state.lift_gain[v]
 
 
 @kernel

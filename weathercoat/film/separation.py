@@ -59,34 +59,29 @@ def find_due(
     """
     out, step = agenda.found, agenda.counts[STEP]
     lift = rules.lift_coefficient * drying_tension(rules, age)
-    loss = rules.adhesion_loss_rate * age
     found = 0
     for i in range(take_due(agenda.vertices, step, out)):
         v = out[i]
         if state.separated[v] or agenda.membership[v] != OUTSIDE or mesh.half_edge[v] < 0:
             continue
-        if lift * state.rest_lift[v] > max(state.adhesion[v] - loss, 0.0):
+        held = max(state.adhesion[v] - state.adhesion_loss[v] * age, 0.0)
+        if lift * (state.rest_lift[v] * state.lift_gain[v]) > held:
             out[found] = v
             found += 1
         else:
             ahead = HORIZON
-            while ahead > 1 and not surely_holds(
-                rules, state.rest_lift[v], state.adhesion[v], age, age + ahead * tick
-            ):
+            while ahead > 1 and not surely_holds(state, rules, v, age, age + ahead * tick):
                 ahead //= 2
             put(agenda.vertices, v, step + ahead)
     return found
 
 
 @kernel
-def surely_holds(rules: FilmRules, rest_lift: float, adhesion: float, age: float, later: float) -> bool:
-    """Whether a vertex cannot separate between two ages as long as nothing round it moves.
-
-    adhesion: that at age 0.
-    """
+def surely_holds(state: FilmState, rules: FilmRules, v: int, age: float, later: float) -> bool:
+    """Whether vertex v cannot separate between two ages as long as nothing round it moves."""
     tension = max(drying_tension(rules, age), drying_tension(rules, later)) * (1.0 + SLACK) + SLACK
-    least = adhesion * (1.0 - SLACK) - rules.adhesion_loss_rate * later
-    return rules.lift_coefficient * tension * rest_lift <= least
+    least = state.adhesion[v] * (1.0 - SLACK) - state.adhesion_loss[v] * later
+    return rules.lift_coefficient * tension * state.rest_lift[v] * state.lift_gain[v] <= least
 
 
 @kernel

@@ -53,6 +53,8 @@ def make_film_state(
     lift_factor, rest_lift = lift_at_rest(mesh, p)
     return FilmState(
         adhesion=layout.adhesion,
+        adhesion_loss=np.full(mesh.vertex_count, p.adhesion_decay_rate * p.adhesion_base),
+        lift_gain=np.ones(mesh.vertex_count),
         separated=np.zeros(capacity, np.bool_),
         separation_age=np.full(capacity, np.inf),
         is_tip=np.zeros(capacity, np.bool_),
@@ -61,6 +63,7 @@ def make_film_state(
         tension_age=np.zeros(face_count),
         tension_cap=np.ones(face_count),
         relief=np.zeros((face_count, 3)),
+        stress=np.ones(face_count),
         fray_age=np.full(face_count, np.inf),
         cohesion=layout.cohesion,
         lift_factor=lift_factor,

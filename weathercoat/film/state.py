@@ -65,7 +65,6 @@ class FilmRules(NamedTuple):
     saturating: bool
     tension_initial: float
     tension_rate: float
-    adhesion_loss_rate: float
     lift_coefficient: float
     lift_convexity: float
     lift_per_valence: bool
@@ -84,12 +83,12 @@ class FilmRules(NamedTuple):
 class FilmState(NamedTuple):
     """State of the film, plain arrays. n0 rest vertices, m faces; arrays over vertices have the capacity 3 m.
 
-    Vertices: adhesion (n0,) at age 0, on origins; separated bool (3 m,); separation_age (3 m,), infinite
-    while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
+    Vertices: adhesion (n0,) at age 0 and adhesion_loss (n0,), per age, on origins; lift_gain (n0,), a factor
+    on what lifts them, on origins; separated bool (3 m,); separation_age (3 m,), infinite while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
     there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at its
     last event, the age of it, and what it tends to; relief (m, 3), the direction at rest of the broken edge
-    that relaxed the face most, zero where none did; fray_age (m,), when the face got its first broken edge,
-    infinite before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the
+    that relaxed the face most, zero where none did; stress (m,), the drying stress there relative to that of
+    the paint, by which tensions count; fray_age (m,), when the face got its first broken edge, infinite before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the
     dihedral at rest; tie uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals.
     crack_budget: (1,), the fraction of a round of fracture carried over between steps. mean_edge: mean rest
     length of the edges. rest_lift (n0,): what the film lifts with at tension 1 while nothing round the vertex
@@ -97,6 +96,8 @@ class FilmState(NamedTuple):
     """
 
     adhesion: Vectors
+    adhesion_loss: Vectors
+    lift_gain: Vectors
     separated: NDArray[np.bool_]
     separation_age: Vectors
     is_tip: NDArray[np.bool_]
@@ -105,6 +106,7 @@ class FilmState(NamedTuple):
     tension_age: Vectors
     tension_cap: Vectors
     relief: Vectors
+    stress: Vectors
     fray_age: Vectors
     cohesion: Vectors
     lift_factor: Vectors
@@ -123,7 +125,6 @@ def make_film_rules(parameters: FilmParameters) -> FilmRules:
         saturating=p.tension_law == "saturating",
         tension_initial=p.tension_initial,
         tension_rate=p.tension_rate,
-        adhesion_loss_rate=p.adhesion_decay_rate * p.adhesion_base,
         lift_coefficient=p.lift_coefficient,
         lift_convexity=p.lift_convexity,
         lift_per_valence=p.lift_sum == "per_valence",
@@ -156,7 +157,7 @@ def drying_tension(rules: FilmRules, age: float) -> float:
 
 @kernel
 def face_tension(state: FilmState, rules: FilmRules, f: int, age: float) -> float:
-    """Tension of face f at an age."""
+    """Tension of face f at an age, in units of the drying stress there."""
     return tension_of(state.tension, state.tension_age, state.tension_cap, rules, f, age)
 
 
@@ -170,9 +171,9 @@ def tension_of(
     return tension_at(tension[f], tension_age[f], tension_cap[f], rules.tension_rate, rules.saturating, age)
 
 
-def adhesion_at(adhesion: Vectors, parameters: FilmParameters, age: float) -> Vectors:
-    """Adhesion at an age: it falls linearly, by a rate of its base, and not below 0."""
-    return np.maximum(adhesion - parameters.adhesion_decay_rate * parameters.adhesion_base * age, 0.0)
+def adhesion_at(adhesion: Vectors, loss: Vectors | float, age: float) -> Vectors:
+    """Adhesion at an age, from that at age 0: it falls linearly, by its loss per age, and not below 0."""
+    return np.maximum(adhesion - loss * age, 0.0)
 
 
 @kernel

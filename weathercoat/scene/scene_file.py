@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
-from weathercoat.config.schema import Real, Switch, parameter, require_number
+from weathercoat.config.section import Real, Switch, parameter, require_number
 
 SCHEMA_ID = "https://json-schema.org/draft/2020-12/schema"
 _AXES = ("x", "y", "z", "-x", "-y", "-z")

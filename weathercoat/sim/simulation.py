@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -17,7 +17,7 @@ from weathercoat.deform.parameters import DeformParameters
 from weathercoat.deform.residual import Residual, measure_residual
 from weathercoat.deform.sleep import Rest, make_rest
 from weathercoat.deform.team import Team
-from weathercoat.film.agenda import Agenda, make_agenda
+from weathercoat.film.agenda import Agenda, forget_forecasts, make_agenda
 from weathercoat.film.flaking import flake
 from weathercoat.film.fracture import fracture
 from weathercoat.film.separation import separate
@@ -33,6 +33,7 @@ from weathercoat.mesh.halfedge import EventLog, HalfEdgeMesh, make_event_log, ma
 from weathercoat.mesh.order import order_surface
 from weathercoat.mesh.surface import Indices, Surface, Vectors
 from weathercoat.sim.snapshot import Snapshot
+from weathercoat.sim.steering import Change, Steering
 from weathercoat.stain import runoff as runoff_room
 from weathercoat.stain import rust as rust_room
 from weathercoat.stain.color import Palette, stain_color
@@ -67,7 +68,7 @@ class Simulation:
 
     `surface` is the input in the order that the simulation uses; `team` are the threads that share a step;
     `flake_areas` lists the rest areas, in square sizes, of all flakes that fell; `solving` sums what the
-    solver did, and `seconds` the time by stage, in the rows of the paper's table.
+    solver did, `steering` changes parameters place by place, and `seconds` the time by stage, in the rows of the paper's table.
     """
 
     surface: Surface
@@ -90,6 +91,7 @@ class Simulation:
     )
     solving: Solving = field(default_factory=Solving)
     team: Team = field(default_factory=Team)
+    steering: Steering | None = None
     log: EventLog = field(init=False)
     rest: Rest = field(init=False)
     momentum: Momentum | None = field(init=False)
@@ -105,9 +107,17 @@ class Simulation:
 
     def derive(self) -> None:
         """Make anew what follows from the state; to be called after the state was changed from outside."""
+        if self.steering is not None:
+            self.steering.go_to(self.age)
         repack(self.mesh, self.constraints)
         self.runoff = make_runoff(self.mesh, self.rust, self.stain_parameters, _UP)
         self.agenda = make_agenda(self.mesh, self.film, make_film_rules(self.film_parameters))
+
+    def steer(self, changes: Sequence[Change]) -> None:
+        """Change parameters place by place, from the start; to be called once, at age 0."""
+        lifts_by_face = self.film_parameters.lift_tension == "face"
+        self.steering = Steering(self.mesh, self.film, self.constraints, changes, lifts_by_face)
+        self.derive()
 
     @property
     def age(self) -> float:
@@ -124,6 +134,8 @@ class Simulation:
         age, tick = self.age, self.age_after(count)
         started = time.perf_counter()
         self.log.clear()
+        if self.steering is not None and self.steering.go_to(age):
+            forget_forecasts(self.agenda)
 
         separating = separate(self.mesh, self.film, self.agenda, self.film_parameters, age, tick)
         release(self.mesh, self.constraints, separating, age)
@@ -167,8 +179,11 @@ class Simulation:
         corners = mesh.tail.reshape(-1, 3)[film_face]
         used, faces = np.unique(corners, return_inverse=True)
         origin = mesh.origin[used]
-        dust = dust_at(self.dust_exposure, self.stain_parameters.dust_rate, age)
-        metal_rust = metal_rust_at(self.rust, self.stain_parameters, age)
+        exposure, worn = self.dust_exposure, None
+        if self.steering is not None:
+            exposure, worn = exposure * self.steering.mean_dirt(age), self.steering.worn
+        dust = dust_at(exposure, self.stain_parameters.dust_rate, age)
+        metal_rust = metal_rust_at(self.rust, self.stain_parameters, age, worn)
         separated = self.film.separated[used]
         return Snapshot(
             step=self.step_count,
@@ -181,7 +196,7 @@ class Simulation:
             separated=separated,
             separation_age=np.where(separated, age - np.minimum(self.film.separation_age[used], age), 0.0),
             adhesion=np.where(
-                separated, 0.0, adhesion_at(self.film.adhesion, self.film_parameters, age)[origin]
+                separated, 0.0, adhesion_at(self.film.adhesion, self.film.adhesion_loss, age)[origin]
             ),
             film_color=stain_color(self.palette.paint, self.palette, self.rust.film[used], dust[origin]),
             substrate_vertices=self.surface.vertices,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -79,10 +80,16 @@ def _bare_metal(
                 bare_age[o] = age
 
 
-def metal_rust_at(rust: RustState, parameters: StainParameters, age: float) -> Vectors:
+def metal_rust_at(
+    rust: RustState, parameters: StainParameters, age: float, worn: Callable[[Vectors], Vectors] | None = None
+) -> Vectors:
     """Rust of the metal under each rest vertex at an age, 0 to 1, (n0,): slow under lifted film, fast where
     it is bare.
+
+    worn: what an age of each vertex counts as, ages (n0,), where something protects the metal.
     """
-    lifted = np.clip(np.minimum(age, rust.bare_age) - rust.lifted_age, 0.0, None)
-    bare = np.clip(age - rust.bare_age, 0.0, None)
+    until = np.minimum(age, rust.bare_age)
+    moments = np.minimum(rust.lifted_age, until), until, np.full(len(until), age)
+    lifted_age, bare_age, now = moments if worn is None else map(worn, moments)
+    lifted, bare = bare_age - lifted_age, now - bare_age
     return -np.expm1(-parameters.rust_lifted_rate * lifted - parameters.rust_bare_rate * bare)

@@ -1,0 +1,1 @@
+"""Masks of steering: from the config, files and a surface to plain arrays."""
