@@ -59,7 +59,10 @@ def simulate(
     done and their number.
     """
     plan = make_plan(load_config(config, overrides), surface, len(surface.faces))
-    simulation = prepare_simulation(surface, plan.loaded.config, threads=threads)
+    loaded = plan.loaded
+    simulation = prepare_simulation(
+        surface, loaded.config, threads=threads, masks_of=loaded.origins["steering"]
+    )
     run_simulation(simulation, [], progress, until=round(until * simulation.steps))
     return simulation
 

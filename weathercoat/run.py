@@ -21,6 +21,8 @@ from weathercoat.deform.parameters import DeformParameters
 from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError, printable
 from weathercoat.film.state import FilmParameters
 from weathercoat.lock import LOCK
+from weathercoat.masks.evaluate import make_changes, require_masks
+from weathercoat.masks.files import hash_masks
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface, side_files
@@ -135,7 +137,9 @@ def run_asset(
             meshed = _mesh(intake, checkpoint, folder)
         report_notes(meshed.notes[len(intake.surface.notes) :], intake.name, say, strict=strict)
         with name_errors(intake.name), watch.time("prepare"):
-            simulation = prepare_simulation(meshed, config, intake.painted, threads=threads)
+            simulation = prepare_simulation(
+                meshed, config, intake.painted, threads=threads, masks_of=loaded.origins["steering"]
+            )
 
         recorder = SnapshotRecorder(folder, config, intake.untouched, watch)
         keeper = CheckpointKeeper(folder, config, meshed, identity, recorder, watch)
@@ -177,16 +181,18 @@ def _take_in(
     *,
     strict: bool,
 ) -> _Intake:
+    masks = hash_masks(loaded)
     surface, inputs = _read(model, format, loaded.config, limit)
     name = next(iter(inputs))
     with name_errors(name):
         report_notes(surface.notes, name, say, strict=strict)
         painted, untouched = split_paint(surface, loaded.config)
+        require_masks(loaded.config.steering, painted, loaded.origins["steering"])
         plan = make_plan(loaded, painted, len(surface.faces))
         require_memory(plan.loaded.config, plan.model_faces, limit)
     if plan.quality is not None:
         say(f"quality {plan.quality['asked']}: {plan.quality['why']}")
-    return _Intake(surface, painted, untouched, inputs, plan)
+    return _Intake(surface, painted, untouched, {**inputs, **masks}, plan)
 
 
 def _mesh(intake: _Intake, checkpoint: Checkpoint | None, folder: Path) -> Surface:
@@ -242,6 +248,11 @@ def _read(
         return surface, hash_inputs(Path(model))
     content = model.read(MAX_BYTES + 1)  # one too many is refused below
     return read_stream(BytesIO(content), format=format, up=config.model.up), {"-": sha256(content)}
+
+
+def hash_job(loaded: LoadedConfig, model: Path) -> dict[str, str]:
+    """SHA-256 of all files that a run needs, by name: those of the model, then those of its masks."""
+    return {**hash_inputs(model), **hash_masks(loaded)}
 
 
 def hash_inputs(model: Path) -> dict[str, str]:
@@ -348,16 +359,23 @@ def painted_faces(surface: Surface, config: Config) -> NDArray[np.bool_]:
 
 
 def prepare_simulation(
-    surface: Surface, config: Config, painted: Surface | None = None, *, threads: int = 1
+    surface: Surface,
+    config: Config,
+    painted: Surface | None = None,
+    *,
+    threads: int = 1,
+    masks_of: str = "",
 ) -> Simulation:
     """A simulation of a surface by a config, at age 0.
 
     painted: the surface before remeshing, whose frame places noise and defects, so that they lie alike at
-    every resolution. Raises CheckError where the surface is no oriented manifold.
+    every resolution. masks_of: where `steering` came from, `FILE:LINE` or an option: the files of its masks
+    lie beside it. Raises CheckError where the surface is no oriented manifold, and ConfigError where a mask
+    does not fit it.
     """
     colors = config.appearance
     try:
-        return make_simulation(
+        simulation = make_simulation(
             surface,
             film=fill(FilmParameters, config),
             deform=fill(DeformParameters, config),
@@ -375,6 +393,9 @@ def prepare_simulation(
         )
     except ValueError as error:
         raise CheckError(f"the mesh for the simulation is no manifold: {error}", file=surface.name) from error
+    if config.steering:
+        simulation.steer(make_changes(config.steering, simulation, masks_of))
+    return simulation
 
 
 def fill(kind: type[_Parameters], config: Config) -> _Parameters:

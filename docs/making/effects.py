@@ -121,6 +121,7 @@ WITHOUT_PICTURE: dict[str, str] = {
     "appearance.young_rust": "a colour",
     "appearance.old_rust": "a colour",
     "appearance.stain": "a colour",
+    "steering": "see [steering](steering.md)",
     "physical.years": "sets other keys; see [physical units](physical.md)",
     "physical.lifetime": "for `physical.years`",
     "physical.stress": "sets other keys",

@@ -12,8 +12,9 @@ from weathercoat.batch.job import Executor, Job, Outcome, Progress, Task
 from weathercoat.batch.price import price_job
 from weathercoat.batch.record import RECORD, Record
 from weathercoat.batch.storage import is_url, join, put_file, read_report
-from weathercoat.errors import AccessError, OutputError
+from weathercoat.errors import AccessError, ConfigError, OutputError
 from weathercoat.lock import FolderLock
+from weathercoat.masks.files import hash_masks
 from weathercoat.output.folder import output_errors
 from weathercoat.resume import fingerprint, missing_files
 from weathercoat.run import hash_inputs
@@ -114,12 +115,12 @@ def _finished_figures(target: str, job: Job, inputs: dict[str, dict[str, str]]) 
         found, snapshots = report["fingerprint"], report["snapshots"]
         if job.asset not in inputs:
             inputs[job.asset] = hash_inputs(Path(job.asset))
-        if found != fingerprint(job.loaded, inputs[job.asset]):
+        if found != fingerprint(job.loaded, {**inputs[job.asset], **hash_masks(job.loaded)}):
             return None
         if not is_url(target) and missing_files(Path(target), report):
             return None
         return dict(snapshots[-1])
-    except (ValueError, KeyError, TypeError, IndexError, AccessError):
+    except (ValueError, KeyError, TypeError, IndexError, AccessError, ConfigError):
         return None
 
 

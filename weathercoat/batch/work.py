@@ -13,7 +13,7 @@ from weathercoat.batch.job import Job, Outcome, Status, Task
 from weathercoat.batch.storage import fetch, is_url, publish, read_report
 from weathercoat.errors import CorruptError, OutputBusyError, ResumeError, WeathercoatError, internal_error
 from weathercoat.resume import fingerprint
-from weathercoat.run import hash_inputs, run_asset
+from weathercoat.run import hash_job, run_asset
 from weathercoat.sim.recorders import Patience
 
 SECONDS_TO_WAIT = 10.0
@@ -154,7 +154,7 @@ def _is_found(report: dict[str, Any]) -> bool:
 
 def _is_current(report: dict[str, Any], job: Job, model: str) -> bool:
     """Whether a report is that of a job with a model at a path, by this version."""
-    return bool(report.get("fingerprint") == fingerprint(job.loaded, hash_inputs(Path(model))))
+    return bool(report.get("fingerprint") == fingerprint(job.loaded, hash_job(job.loaded, Path(model))))
 
 
 def _is_within(file: str | None, target: str) -> bool:

@@ -9,7 +9,8 @@ from typing import Any
 
 from weathercoat.config.document import read_value
 from weathercoat.config.load import LoadedConfig
-from weathercoat.config.schema import Config, Parameter, Section, parameters, section_of
+from weathercoat.config.schema import Config, Parameter, entry_of, parameters, section_of
+from weathercoat.config.section import Section
 
 _WIDEST = 80  # characters; comments stand beside values that are no longer
 _EXAMPLE_HEADER = """\
@@ -67,7 +68,7 @@ def resolved_yaml(loaded: LoadedConfig) -> str:
 def reference_markdown() -> str:
     """Every parameter in tables, and the keys of the paper's symbols."""
     lines = [_MARKDOWN_HEADER]
-    for section, about, members in _sections():
+    for section, about, members in (*_sections(), *_entries()):
         lines += [f"## `{section}`" if section else "## Top level", "", about, ""]
         lines += ["| key | default | accepts | unit | meaning |", "|---|---|---|---|---|"]
         for parameter in members:
@@ -98,6 +99,19 @@ def _sections() -> Iterator[tuple[str, str, list[Parameter]]]:
         section = section_of(field)
         if section is not None:
             yield name, _first_paragraph(section), list(parameters(section, f"{name}."))
+
+
+def _entries(section: type[Section] = Config, prefix: str = "") -> Iterator[tuple[str, str, list[Parameter]]]:
+    """As `_sections`, of what lists hold and of the sections in that: `steering[]`, `steering[].by[]`."""
+    for name, field in section.model_fields.items():
+        entry = entry_of(field)
+        inner = entry or (section_of(field) if prefix else None)
+        if inner is None:
+            continue
+        key = f"{prefix}{field.alias or name}{'[]' if entry else ''}"
+        direct = [member for member in parameters(inner, f"{key}.") if member.key.rpartition(".")[0] == key]
+        yield key, _first_paragraph(inner), direct
+        yield from _entries(inner, f"{key}.")
 
 
 def _first_paragraph(section: type[Section]) -> str:

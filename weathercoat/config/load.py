@@ -299,9 +299,7 @@ class _Merge:
                     self._note_lines(item.value, path, where)
                     target[name] = without_lines(item.value)
 
-    def _change_entries(
-        self, entries: list[Any], items: dict[str, Item], above: KeyPath, where: str
-    ) -> None:
+    def _change_entries(self, entries: list[Any], items: dict[str, Item], above: KeyPath, where: str) -> None:
         """Change entries of a list that are given by their numbers from 0, as `steering.0.multiply`."""
         for number, item in items.items():
             path = (*above, f"[{number}]")

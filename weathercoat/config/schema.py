@@ -603,7 +603,7 @@ def parameters(section: type[Section] = Config, prefix: str = "") -> Iterator[Pa
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         yield Parameter(
             key=key,
-            default=field.default,
+            default="required" if field.is_required() else field.default,
             description=field.description or "",
             kind=_words_in(field.metadata)
             or _describe_kind(field.annotation) + _describe_bounds(field.metadata),

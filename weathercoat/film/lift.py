@@ -48,8 +48,8 @@ def lift_on(mesh: HalfEdgeMesh, state: FilmState, rules: FilmRules, v: int, age:
 
     It is the sum over the half-edges opposite to the vertex of the sigmoid of their present bend, times the
     tension of their face where that lifts. A half-edge without a twin lifts as if flat, and a hinge whose
-    corners are all attached has not moved since the start. The vertex's gain counts. `lift_per_valence` scales the sum to six
-    half-edges, so that valence and rim do not matter.
+    corners are all attached has not moved since the start. The vertex's gain counts. `lift_per_valence`
+    scales the sum to six half-edges, so that valence and rim do not matter.
     """
     positions, tail, twin, separated = mesh.positions, mesh.tail, mesh.twin, state.separated
     total = 0.0

@@ -83,16 +83,18 @@ class FilmRules(NamedTuple):
 class FilmState(NamedTuple):
     """State of the film, plain arrays. n0 rest vertices, m faces; arrays over vertices have the capacity 3 m.
 
-    Vertices: adhesion (n0,) at age 0 and adhesion_loss (n0,), per age, on origins; lift_gain (n0,), a factor
-    on what lifts them, on origins; separated bool (3 m,); separation_age (3 m,), infinite while attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
-    there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at its
-    last event, the age of it, and what it tends to; relief (m, 3), the direction at rest of the broken edge
-    that relaxed the face most, zero where none did; stress (m,), the drying stress there relative to that of
-    the paint, by which tensions count; fray_age (m,), when the face got its first broken edge, infinite before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the
+    Vertices: adhesion (n0,) at age 0 and adhesion_loss (n0,), per age, on origins; lift_gain (n0,), a
+    factor on what lifts them, on origins; separated bool (3 m,); separation_age (3 m,), infinite while
+    attached; is_tip bool (3 m,), where the vertex is the end of one crack, and crack_direction (3 m, 3)
+    there, a unit vector on the rest surface. Faces: tension, tension_age, tension_cap (m,): the value at
+    its last event, the age of it, and what it tends to; relief (m, 3), the direction at rest of the broken
+    edge that relaxed the face most, zero where none did; stress (m,), the drying stress there relative to
+    that of the paint, by which tensions count; fray_age (m,), when the face got its first broken edge,
+    infinite before. Half-edges: cohesion (3 m,) before fraying; lift_factor (3 m,), the sigmoid of the
     dihedral at rest; tie uint64 (3 m,), a hash of the edge's rest midpoint that decides between equals.
     crack_budget: (1,), the fraction of a round of fracture carried over between steps. mean_edge: mean rest
-    length of the edges. rest_lift (n0,): what the film lifts with at tension 1 while nothing round the vertex
-    has moved; disturbed bool (3 m,), the attached vertices round which something has.
+    length of the edges. rest_lift (n0,): what the film lifts with at tension 1 while nothing round the
+    vertex has moved; disturbed bool (3 m,), the attached vertices round which something has.
     """
 
     adhesion: Vectors

@@ -68,7 +68,8 @@ class Simulation:
 
     `surface` is the input in the order that the simulation uses; `team` are the threads that share a step;
     `flake_areas` lists the rest areas, in square sizes, of all flakes that fell; `solving` sums what the
-    solver did, `steering` changes parameters place by place, and `seconds` the time by stage, in the rows of the paper's table.
+    solver did, `steering` changes parameters place by place, and `seconds` the time by stage, in the rows
+    of the paper's table.
     """
 
     surface: Surface

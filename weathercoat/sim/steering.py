@@ -41,7 +41,8 @@ class Change:
 
     def at(self, ages: Vectors | float) -> Vectors:
         """x at an age, or at ages (n0,)."""
-        return np.interp(ages, [age for age, _ in self.keys], [x for _, x in self.keys])
+        when, values = zip(*self.keys, strict=True)
+        return np.asarray(np.interp(ages, when, values))
 
 
 class Steering:
@@ -49,9 +50,10 @@ class Steering:
 
     Adhesion and cohesion are those of the film at age 0. Tension is the drying stress relative to that of the
     paint, by which every tension counts; it lifts in proportion. Thickness is relative to that of the paint:
-    by Stoney, a thicker film pulls in proportion, and curls to a radius that is larger in proportion; within
-    the film load and strength both grow with it, so cracks do not change. It is above 0 and has no keys. Dirt is a factor on the rate of
-    dust. Protection, 0 to 1, takes its share from the loss of adhesion and from the rust of the metal.
+    by Stoney, a thicker film pulls in proportion, and curls to a radius that is larger in proportion;
+    within the film load and strength both grow with it, so cracks do not change. It is above 0 and has no
+    keys. Dirt is a factor on the rate of dust. Protection, 0 to 1, takes its share from the loss of
+    adhesion and from the rust of the metal.
     """
 
     def __init__(
