@@ -1,4 +1,4 @@
-"""Steering: what changes do to the arrays, that the fast failure stays the plain one, and that runs resume."""
+"""Steering: what changes do, that the fast failure stays the plain one, and that runs resume to the bit."""
 
 from __future__ import annotations
 
