@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
-from weathercoat.config.wording import explain
 from weathercoat.errors import ConfigError, ConfigProblem
 
 if TYPE_CHECKING:
@@ -20,7 +17,10 @@ def with_values(loaded: LoadedConfig, values: Mapping[str, Any], origin: str) ->
 
     Raises ConfigError for values out of bounds, or that do not go together with the rest.
     """
+    from pydantic import ValidationError
+
     from weathercoat.config.schema import Config
+    from weathercoat.config.wording import explain
 
     content = loaded.config.as_dict()
     for key, value in values.items():
