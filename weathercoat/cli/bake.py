@@ -14,9 +14,11 @@ from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
     from weathercoat.finished import FinishedRun
+    from weathercoat.mesh.surface import Surface
     from weathercoat.output.maps.bake import Baker, MapParameters
 
 _MOST = 16_384
+_SIZE_PER_GAP = 256  # charts of an atlas are this share of its size apart: 8 texels at 2048
 _SIZE = re.compile(r"(\d{1,5})(?:x(\d{1,5}))?")
 
 
@@ -120,6 +122,7 @@ def command(
     from weathercoat.output.maps.bake import MapParameters
     from weathercoat.output.maps.channels import MAPS, map_kinds, parse_pack
     from weathercoat.output.maps.folder import MAPS_REPORT
+    from weathercoat.output.meshes import write_mesh
     from weathercoat.run import report_compiling
 
     names = tuple(MAPS) if maps is None else tuple(name.strip() for name in maps.split(",") if name.strip())
@@ -137,7 +140,9 @@ def command(
     finished = open_run(run)
     folder = RunFolder(output, overwrite=overwrite, marker=MAPS_REPORT)
     with Messages(quiet=quiet or as_json) as messages, report_compiling(messages.log), folder as target:
-        baker = _prepare(finished, model, parameters, atlas=atlas, folder=target)
+        baker = prepare_baker(finished, finished.read_model(model), size=min(size), atlas=atlas)
+        if atlas:
+            write_mesh(target / "atlas.obj", baker.surface)
         written = _bake(finished, step, baker, parameters, target, threads or options.threads_beside(1))
         if step == "all":
             from weathercoat.output.report import write_json
@@ -149,21 +154,18 @@ def command(
         _say(output, written)
 
 
-def _prepare(
-    finished: FinishedRun, model: Path | None, parameters: MapParameters, *, atlas: bool, folder: Path
-) -> Baker:
+def prepare_baker(finished: FinishedRun, surface: Surface, *, size: int, atlas: bool) -> Baker:
+    """What bakes the snapshots of a run onto its model, with texture coordinates of its own for `atlas`, laid
+    out for maps of `size` texels.
+    """
     from weathercoat.output.maps.atlas import make_atlas
     from weathercoat.output.maps.bake import Baker
-    from weathercoat.output.meshes import write_mesh
     from weathercoat.recording import picture_parameters
     from weathercoat.run import painted_faces
 
-    surface = finished.read_model(model)
     is_painted = painted_faces(surface, finished.config)
     if atlas:
-        least = min(parameters.width, parameters.height)
-        surface = make_atlas(surface, size=least, padding=max(2, parameters.padding // 4))
-        write_mesh(folder / "atlas.obj", surface)
+        surface = make_atlas(surface, size=size, padding=max(2, size // _SIZE_PER_GAP))
     look = picture_parameters(finished.config)
     return Baker(surface, is_painted, finished.read_snapshot(), look, up=finished.up)
 

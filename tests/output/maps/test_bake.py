@@ -14,6 +14,7 @@ from PIL import Image
 from tests.output.snapshots import make_sheet, make_snapshot
 from weathercoat.errors import TextureCoordinatesError, UsageError
 from weathercoat.mesh.surface import Surface, make_surface
+from weathercoat.output.maps import bake
 from weathercoat.output.maps.bake import Baker, MapParameters
 from weathercoat.output.maps.channels import MAPS, parse_pack
 from weathercoat.output.maps.folder import write_maps
@@ -50,6 +51,13 @@ def baked(
 def half_bare(**more: Any) -> Snapshot:
     mesh = sorted_sheet()
     return make_snapshot(mesh=mesh, lost=len(mesh[1]) // 2, **more)
+
+
+def make_lifted() -> Snapshot:
+    """A plate half bare, whose film rises from one side to the other and hangs over."""
+    snapshot = half_bare()
+    rise = 0.1 * snapshot.film_vertices[:, [2]] * np.array([-1.0, 1.0, 0.0])
+    return replace(snapshot, film_vertices=snapshot.film_vertices + rise)
 
 
 def test_a_plate_half_bare_has_a_mask_of_half_its_texels(tmp_path: Path) -> None:
@@ -114,6 +122,16 @@ def test_threads_and_repetition_change_no_byte(tmp_path: Path) -> None:
     for path in (tmp_path / "a").iterdir():
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
         assert path.read_bytes() == (tmp_path / "c" / path.name).read_bytes()
+
+
+def test_bands_leave_no_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = plate()
+    assert surface.uv is not None
+    apart = plate(uv=0.1 + 0.8 * surface.uv)
+    _, whole = baked(tmp_path / "a", apart, make_lifted(), height=300)
+    monkeypatch.setattr(bake, "_BAND", 1)
+    _, banded = baked(tmp_path / "b", apart, make_lifted(), height=300)
+    assert all((whole[name] == banded[name]).all() for name in whole)
 
 
 def test_packing_puts_maps_into_channels(tmp_path: Path) -> None:

@@ -18,14 +18,13 @@ def written(pixels: np.ndarray, bands: int) -> bytes:
     height, width, channels = pixels.shape
     writer = PngWriter(stream, width, height, channels, 8 * pixels.dtype.itemsize, is_srgb=channels == 3)
     for rows in np.array_split(np.arange(height), bands):
-        above = None if rows[0] == 0 else pixels[rows[0] - 1]
-        writer.add(pack_rows(pixels[rows], above, level=1))
+        writer.add(pack_rows(pixels[rows], level=1))
     writer.finish()
     return stream.getvalue()
 
 
 def decoded(content: bytes, shape: tuple[int, int, int]) -> np.ndarray:
-    """16-bit pixels of a PNG whose rows have the filter Up; checksums are checked by zlib."""
+    """16-bit pixels of a PNG whose rows have the filters None and Up; checksums are checked by zlib."""
     at, data = 8, b""
     while at < len(content):
         length, kind = struct.unpack(">I4s", content[at : at + 8])
@@ -35,8 +34,9 @@ def decoded(content: bytes, shape: tuple[int, int, int]) -> np.ndarray:
         at += 12 + length
     height, width, channels = shape
     rows = np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, -1)
-    assert (rows[:, 0] == 2).all()
-    plain = np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8)
+    plain = rows[:, 1:].copy()
+    for row in np.flatnonzero(rows[:, 0] == 2):
+        plain[row] += plain[row - 1]
     return plain.view(">u2").reshape(height, width, channels)
 
 

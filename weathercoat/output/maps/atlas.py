@@ -27,11 +27,11 @@ def make_atlas(surface: Surface, *, size: int, padding: int) -> Surface:
     atlas.add_mesh(surface.vertices.astype(np.float32), surface.faces.astype(np.uint32))
     pack = xatlas.PackOptions()
     pack.resolution, pack.padding = size, padding
+    pack.rotate_charts = False  # it turns charts by exchanging u and v, and so mirrors them
     atlas.generate(xatlas.ChartOptions(), pack, False)
     vertex, corner, uv = atlas[0]
     if not np.array_equal(vertex[corner], surface.faces):
         raise UsageError("no atlas could be laid out", file=surface.name, remedy="repair the model")
-    # its rows grow downwards
-    placed = (uv.astype(np.float64) * (1.0, -1.0) + (0.0, 1.0))[corner]
+    placed = uv.astype(np.float64)[corner]
     parts = tuple(replace(part, material=-1) for part in surface.parts)
     return replace(surface, uv=placed, parts=parts, materials=())

@@ -85,13 +85,11 @@ class _Sheet(NamedTuple):
 
 class _Band(NamedTuple):
     """Planes (N_PLANES, texels) of a band with rows beyond its ends; for each of its texels the place in them
-    that it shows, int32 (r, w), and for those of the row above, (w,), None at the top; the numbers of texels
-    that a face covers, and that several do.
+    that it shows, int32 (r, w); the numbers of texels that a face covers, and that several do.
     """
 
     planes: Planes
     source: Indices
-    above: Indices | None
     covered: int
     claimed_again: int
 
@@ -191,9 +189,7 @@ class Baker:
                     return
                 band = self._bake_band(sheet, state, bands[number], parameters)
                 counts[number] = band.covered, band.claimed_again
-                parts = {
-                    name: sink.prepare(band.planes, band.source, band.above) for name, sink in sinks.items()
-                }
+                parts = {name: sink.prepare(band.planes, band.source) for name, sink in sinks.items()}
                 with turn:
                     waiting[number] = parts
                     while next_written in waiting:
@@ -228,7 +224,7 @@ class Baker:
         return PngSink(path, kind, parameters.width, parameters.height, parameters.bits)
 
     def _bake_band(self, sheet: _Sheet, state: _State, band: range, parameters: MapParameters) -> _Band:
-        beyond = max(parameters.padding, REACH) + 1
+        beyond = parameters.padding + REACH + 1
         first = max(0, band.start - beyond)
         rows, columns = min(parameters.height, band.stop + beyond) - first, parameters.width
         inner = slice(band.start - first, band.stop - first)
@@ -245,8 +241,7 @@ class Baker:
         planes = np.empty((N_PLANES, rows * columns), np.float32)
         texel = (1.0 / columns, 1.0 / parameters.height)
         self._fill(sheet, state, face, weights, texels, texel, planes)
-        above = source[inner.start - 1] if band.start > 0 else None
-        return _Band(planes, source[inner], above, covered, claimed_again)
+        return _Band(planes, source[inner], covered, claimed_again)
 
     def _fill(
         self,

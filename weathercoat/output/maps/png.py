@@ -15,30 +15,21 @@ from numpy.typing import NDArray
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 2: 4, 3: 2, 4: 6}
-_UP = 2  # the filter: of smooth maps, a row differs little from the one above
+_NONE, _UP = 0, 2  # filters: in smooth maps a row differs little from the one above
 _ADLER = 65521
 
 
-def pack_rows(
-    rows: NDArray[np.uint8] | NDArray[np.uint16],
-    above: NDArray[np.uint8] | NDArray[np.uint16] | None,
-    *,
-    level: int,
-) -> tuple[bytes, int, int]:
-    """Rows (r, w, c) as PNG filters and compresses them; `above` (w, c) is the row before, None for the
-    first.
+def pack_rows(rows: NDArray[np.uint8] | NDArray[np.uint16], *, level: int) -> tuple[bytes, int, int]:
+    """Rows (r, w, c) as PNG filters and compresses them.
 
     Returns the compressed bytes, which end at a whole byte, and the Adler-32 checksum and the length of what
     was compressed.
     """
-    count = len(rows)
-    raw = rows.astype(rows.dtype.newbyteorder(">"), copy=False).view(np.uint8).reshape(count, -1)
-    before = np.zeros_like(raw[:1])
-    if above is not None:
-        before = above[None].astype(rows.dtype.newbyteorder(">"), copy=False).view(np.uint8).reshape(1, -1)
-    filtered = np.empty((count, 1 + raw.shape[1]), np.uint8)
-    filtered[:, 0] = _UP
-    np.subtract(raw[:1], before, out=filtered[:1, 1:])
+    raw = rows.astype(rows.dtype.newbyteorder(">"), copy=False).view(np.uint8).reshape(len(rows), -1)
+    filtered = np.empty((len(rows), 1 + raw.shape[1]), np.uint8)
+    # the first row is as it is, so that a band needs no other
+    filtered[:, 0], filtered[0, 0] = _UP, _NONE
+    filtered[0, 1:] = raw[0]
     np.subtract(raw[1:], raw[:-1], out=filtered[1:, 1:])
     packer = zlib.compressobj(level, zlib.DEFLATED, -15)
     content = packer.compress(filtered.data) + packer.flush(zlib.Z_FULL_FLUSH)

@@ -21,7 +21,7 @@ _COMPRESSION = 1  # of PNG: higher levels take several times as long for a tenth
 class Sink(Protocol):
     """A map that is written a band at a time: `prepare` in any order and thread, `add` in order."""
 
-    def prepare(self, planes: Planes, source: Indices, above: Indices | None) -> Any: ...
+    def prepare(self, planes: Planes, source: Indices) -> Any: ...
 
     def add(self, band: Any) -> None: ...
 
@@ -36,12 +36,9 @@ class PngSink:
         self._stream = path.open("wb")
         self._writer = PngWriter(self._stream, width, height, len(kind.channels), bits, is_srgb=kind.is_color)
 
-    def prepare(self, planes: Planes, source: Indices, above: Indices | None) -> tuple[bytes, int, int]:
-        """The texels whose values are at `source` (r, w) in the planes, below the row `above` (w,)."""
-        before = None
-        if above is not None:
-            before = quantised(self._kind, planes, above[None], self._bits)[0]
-        return pack_rows(quantised(self._kind, planes, source, self._bits), before, level=_COMPRESSION)
+    def prepare(self, planes: Planes, source: Indices) -> tuple[bytes, int, int]:
+        """The rows of texels whose values are at `source` (r, w) in the planes."""
+        return pack_rows(quantised(self._kind, planes, source, self._bits), level=_COMPRESSION)
 
     def add(self, band: tuple[bytes, int, int]) -> None:
         """Write the next band."""
@@ -64,7 +61,7 @@ class ExrSink:
         self._path, self._kind, self._factors = path, kind, factors
         self._bands: list[NDArray[np.float16]] = []
 
-    def prepare(self, planes: Planes, source: Indices, above: Indices | None) -> NDArray[np.float16]:
+    def prepare(self, planes: Planes, source: Indices) -> NDArray[np.float16]:
         """The texels of a band, (r, w, channels)."""
         return as_floats(self._kind, planes, source, self._factors)
 
