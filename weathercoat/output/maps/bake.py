@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 from weathercoat.deform.team import Team
 from weathercoat.mesh.surface import Indices, Surface, Vectors
 from weathercoat.output.display import Normalisation
-from weathercoat.output.maps import dress as planes_of
+from weathercoat.output.maps import planes as planes_of
 from weathercoat.output.maps.channels import MAPS, MapKind, map_kinds, with_range
-from weathercoat.output.maps.dress import N_PLANES, Planes, dress
+from weathercoat.output.maps.dress import dress
 from weathercoat.output.maps.film import FilmCover, find_seen, make_film_cover
 from weathercoat.output.maps.layout import Tile, make_layout, uv_areas
 from weathercoat.output.maps.locate import locate, make_ground
 from weathercoat.output.maps.own import OwnLook, moved_places
 from weathercoat.output.maps.padding import find_padding
+from weathercoat.output.maps.planes import N_PLANES, Planes
 from weathercoat.output.maps.raster import rasterise, rasterise_slivers, texel_corners
-from weathercoat.output.maps.relief import REACH, carve
+from weathercoat.output.maps.relief import REACH, carve, emboss
 from weathercoat.output.maps.sinks import ExrSink, PngSink, Sink
 from weathercoat.output.maps.tangents import make_frames
 from weathercoat.output.pictures import PictureParameters, make_palette
@@ -238,9 +239,11 @@ class Baker:
         find_padding(face, parameters.padding, source)
         texels = np.flatnonzero(face.ravel() >= 0)
         face.ravel()[texels] = sheet.tile.faces[face.ravel()[texels]]
+        is_shown = np.zeros(face.size, np.bool_)
+        is_shown[source[inner][source[inner] >= 0]] = True
         planes = np.empty((N_PLANES, rows * columns), np.float32)
         texel = (1.0 / columns, 1.0 / parameters.height)
-        self._fill(sheet, state, face, weights, texels, texel, planes)
+        self._fill(sheet, state, face, weights, texels, texels[is_shown[texels]], texel, planes)
         return _Band(planes, source[inner], covered, claimed_again)
 
     def _fill(
@@ -250,9 +253,11 @@ class Baker:
         face: Indices,
         weights: NDArray[np.float32],
         texels: NDArray[np.int64],
+        shown: NDArray[np.int64],
         texel: tuple[float, float],
         planes: Planes,
     ) -> None:
+        """Fill the planes at the texels that are shown, and their relief at all, since it counts beside."""
         film, snapshot, frames, metal = state.film, state.snapshot, self._frames, self._ground.faces
         ground, where = locate(self._ground, face, weights, self._vertices, self.surface.faces)
         seen, seen_where = np.empty_like(face), np.zeros_like(weights)
@@ -261,21 +266,26 @@ class Baker:
             ground, where, self._rest, metal, film.normals, film.covering, film.has_moved, film.first,
             film.reach, film.vertices, film.faces, seen, seen_where, height, is_back,
         )  # fmt: skip
-        flat, flat_weights, flat_where = face.ravel(), weights.reshape(-1, 2), seen_where.reshape(-1, 2)
+        flat, flat_weights = face.ravel(), weights.reshape(-1, 2)
+        flat_seen, flat_where = seen.ravel(), seen_where.reshape(-1, 2)
+        emboss(
+            texels, flat, flat_weights, self._is_painted, frames.normals, sheet.texel_size, ground.ravel(),
+            self._rest, metal, flat_seen, flat_where, height.ravel(), is_back.ravel(), film.covering,
+            film.metal_face, film.corner_normals, film.sides, self._thickness, _BEVEL * self._thickness,
+            state.highest, planes,
+        )  # fmt: skip
         uv = None if snapshot.surface is None else snapshot.surface.uv
-        moved = moved_places(film, uv, seen.ravel()[texels], flat_where[texels])
-        own_color, own_orm = self._own.at(flat[texels], flat_weights[texels], texel, moved)
+        moved = moved_places(film, uv, flat_seen[shown], flat_where[shown])
+        color, orm, tilt = self._own.at(flat[shown], flat_weights[shown], texel, moved)
         dress(
-            texels, flat, flat_weights, self._is_painted, self._own.material >= 0, own_color, own_orm,
-            self._own.shows, frames.normals, sheet.texel_size, ground.ravel(), where.reshape(-1, 2),
-            self._rest, metal, state.metal_values, seen.ravel(), flat_where, height.ravel(), is_back.ravel(),
-            film.covering, film.faces, film.metal_face, state.film_values, film.corner_normals, film.sides,
-            self._thickness, _BEVEL * self._thickness, float(snapshot.age), state.highest, self._paint,
-            self._palette, self._up, planes,
+            shown, flat, self._is_painted, self._own.material >= 0, self._own.shows, color, orm,
+            ground.ravel(), where.reshape(-1, 2), self._rest, metal, state.metal_values, flat_seen,
+            flat_where, is_back.ravel(), film.faces, film.metal_face, state.film_values,
+            float(snapshot.age), self._paint, self._palette, self._up, planes,
         )  # fmt: skip
         carve(
-            texels, face, weights, frames.chart, frames.normals, frames.tangents, frames.signs,
-            sheet.along_column, sheet.along_row, planes,
+            shown, face, weights, frames.chart, frames.normals, frames.tangents, frames.signs,
+            sheet.along_column, sheet.along_row, tilt, planes,
         )  # fmt: skip
 
 

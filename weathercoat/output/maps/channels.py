@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from weathercoat.compile import kernel
 from weathercoat.errors import UsageError
 from weathercoat.mesh.surface import Indices
-from weathercoat.output.maps import dress
-from weathercoat.output.maps.dress import Planes
+from weathercoat.output.maps import planes as planes_of
+from weathercoat.output.maps.planes import Planes
 
 _STEPS = 65536  # of the table by which linear light becomes sRGB
 
@@ -37,26 +37,28 @@ class MapKind:
 
 
 SCALARS = {
-    "occlusion": Channel(dress.OCCLUSION, 1.0),
-    "roughness": Channel(dress.ROUGHNESS, 1.0),
-    "metalness": Channel(dress.METALNESS),
-    "height": Channel(dress.HEIGHT),
-    "bare": Channel(dress.BARE),
-    "rust": Channel(dress.RUST),
-    "dirt": Channel(dress.DIRT),
-    "crack": Channel(dress.CRACKED),
-    "lift": Channel(dress.LIFT),
-    "separated": Channel(dress.SEPARATED),
-    "age": Channel(dress.AGE),
+    "occlusion": Channel(planes_of.OCCLUSION, 1.0),
+    "roughness": Channel(planes_of.ROUGHNESS, 1.0),
+    "metalness": Channel(planes_of.METALNESS),
+    "height": Channel(planes_of.HEIGHT),
+    "bare": Channel(planes_of.BARE),
+    "rust": Channel(planes_of.RUST),
+    "dirt": Channel(planes_of.DIRT),
+    "crack": Channel(planes_of.CRACKED),
+    "lift": Channel(planes_of.LIFT),
+    "separated": Channel(planes_of.SEPARATED),
+    "age": Channel(planes_of.AGE),
 }
 MAPS: dict[str, MapKind] = {
-    "base_color": MapKind(tuple(Channel(plane) for plane in (dress.RED, dress.GREEN, dress.BLUE)), True),
+    "base_color": MapKind(
+        tuple(Channel(plane) for plane in (planes_of.RED, planes_of.GREEN, planes_of.BLUE)), True
+    ),
     "orm": MapKind((SCALARS["occlusion"], SCALARS["roughness"], SCALARS["metalness"])),
     "normal": MapKind(
         (
-            Channel(dress.NORMAL_X, 0.0, -1.0, 1.0),
-            Channel(dress.NORMAL_Y, 0.0, -1.0, 1.0),
-            Channel(dress.NORMAL_Z, 1.0, -1.0, 1.0),
+            Channel(planes_of.NORMAL_X, 0.0, -1.0, 1.0),
+            Channel(planes_of.NORMAL_Y, 0.0, -1.0, 1.0),
+            Channel(planes_of.NORMAL_Z, 1.0, -1.0, 1.0),
         )
     ),
     **{

@@ -70,10 +70,14 @@ def make_film_cover(snapshot: Snapshot, rest: Vectors, film: Vectors, neighbors:
     moved = np.flatnonzero(has_moved).astype(np.int32)
     if len(moved):
         tree = make_closest_tree(film, faces[moved])
-        _find_reach(rest, metal, normals, tree.box, tree.face, highest + _UNDER, first, reach)
+        _find_reach(
+            rest, metal, normals, film, faces[moved], tree.box, tree.face, highest + _UNDER, first, reach
+        )
         first = np.concatenate([[0], np.cumsum(first[:-1])]).astype(np.int64)
         reach = np.zeros(int(first[-1]), np.int32)
-        _find_reach(rest, metal, normals, tree.box, tree.face, highest + _UNDER, first, reach)
+        _find_reach(
+            rest, metal, normals, film, faces[moved], tree.box, tree.face, highest + _UNDER, first, reach
+        )
         reach = moved[reach]
     return FilmCover(
         vertices=np.ascontiguousarray(film),
@@ -115,6 +119,8 @@ def _find_reach(
     rest: Vectors,
     metal: Indices,
     normals: Vectors,
+    film: Vectors,
+    faces: Indices,
     box: Vectors,
     leaf_face: Indices,
     highest: float,
@@ -123,8 +129,8 @@ def _find_reach(
 ) -> None:
     """Count, or where `reach` has room list, the film faces that rays from each face of the metal may meet.
 
-    The rays from a face fill a cone round their mean direction, and what may meet it are the leaves of a tree
-    whose spheres do.
+    The rays from a face fill a cone round their mean direction. What may meet it are the leaves of a tree
+    whose spheres do, and of these the triangles that overlap the face as seen along that direction.
     """
     first_leaf = len(box) // 2
     is_count = len(reach) == 0
@@ -170,14 +176,87 @@ def _find_reach(
             if beside > radius + half + deep * spread * stretch:
                 continue
             if node >= first_leaf:
+                f = leaf_face[node - first_leaf]
+                if _is_apart(rest, metal, t, film, faces, f, axis, deep * spread * stretch):
+                    continue
                 if not is_count:
-                    reach[at + count] = leaf_face[node - first_leaf]
+                    reach[at + count] = f
                 count += 1
             else:
                 waiting[top], waiting[top + 1] = 2 * node + 1, 2 * node + 2
                 top += 2
         if is_count:
             first[t] = count
+
+
+@kernel
+def _is_apart(
+    first: Vectors,
+    first_faces: Indices,
+    f: int,
+    second: Vectors,
+    second_faces: Indices,
+    g: int,
+    axis: Vectors,
+    margin: float,
+) -> bool:
+    """Whether two triangles, seen along `axis`, are further apart than `margin` across a side of either."""
+    for turn in range(2):
+        for i in range(3):
+            length, own, least, most = 0.0, 0.0, np.inf, -np.inf
+            nx, ny, nz = 0.0, 0.0, 0.0
+            for k in range(3):
+                if turn == 0:
+                    p, q, o = first_faces[f, i], first_faces[f, (i + 1) % 3], first_faces[f, (i + 2) % 3]
+                    v = second_faces[g, k]
+                    ex, ey, ez = (
+                        first[q, 0] - first[p, 0],
+                        first[q, 1] - first[p, 1],
+                        first[q, 2] - first[p, 2],
+                    )
+                    ox, oy, oz = (
+                        first[o, 0] - first[p, 0],
+                        first[o, 1] - first[p, 1],
+                        first[o, 2] - first[p, 2],
+                    )
+                    vx, vy, vz = (
+                        second[v, 0] - first[p, 0],
+                        second[v, 1] - first[p, 1],
+                        second[v, 2] - first[p, 2],
+                    )
+                else:
+                    p, q, o = second_faces[g, i], second_faces[g, (i + 1) % 3], second_faces[g, (i + 2) % 3]
+                    v = first_faces[f, k]
+                    ex, ey, ez = (
+                        second[q, 0] - second[p, 0],
+                        second[q, 1] - second[p, 1],
+                        second[q, 2] - second[p, 2],
+                    )
+                    ox, oy, oz = (
+                        second[o, 0] - second[p, 0],
+                        second[o, 1] - second[p, 1],
+                        second[o, 2] - second[p, 2],
+                    )
+                    vx, vy, vz = (
+                        first[v, 0] - second[p, 0],
+                        first[v, 1] - second[p, 1],
+                        first[v, 2] - second[p, 2],
+                    )
+                nx, ny, nz = (
+                    ey * axis[2] - ez * axis[1],
+                    ez * axis[0] - ex * axis[2],
+                    ex * axis[1] - ey * axis[0],
+                )
+                length = np.sqrt(nx * nx + ny * ny + nz * nz)
+                own = ox * nx + oy * ny + oz * nz
+                far = vx * nx + vy * ny + vz * nz
+                least, most = min(least, far), max(most, far)
+            if length == 0.0:
+                continue
+            low, high = min(0.0, own), max(0.0, own)
+            if least > high + margin * length or most < low - margin * length:
+                return True
+    return False
 
 
 @kernel

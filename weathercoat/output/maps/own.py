@@ -25,7 +25,8 @@ class OwnLook:
         self.surface = surface
         self.material = face_materials(surface)
         self.shows = film_materials(surface, look) >= 0
-        self._is_wanted = (self.shows | ~is_painted) & (self.material >= 0)
+        has_normals = np.array(["normalTexture" in each.entry for each in surface.materials] + [False])
+        self._is_wanted = (self.shows | ~is_painted | has_normals[self.material]) & (self.material >= 0)
         used = np.unique(self.material[self._is_wanted])
         self._materials = {int(i): read_material(surface.materials[i]) for i in used}
         colors = surface.colors
@@ -37,15 +38,17 @@ class OwnLook:
         weights: Floats,
         texel: tuple[float, float],
         moved: tuple[NDArray[np.int64], Vectors] | None,
-    ) -> tuple[Floats, Floats]:
-        """Colour (k, 3), linear, and occlusion, roughness and metalness (k, 3) at places on faces (k,) with
-        `weights` (k, 2); white, open, rough and no metal where a face has no material.
+    ) -> tuple[Floats, Floats, Floats]:
+        """Colour (k, 3), linear, occlusion, roughness and metalness (k, 3), and the tilt of the normal by
+        tangent and bitangent (k, 2), at places on faces (k,) with `weights` (k, 2); white, open, rough, no
+        metal and flat where a face has no material.
 
         texel: width and height of what a place covers in texture space. moved: places that show other
         texture coordinates than their own, and these (j, 2).
         """
         color = np.ones((len(face), 3), np.float32)
         orm = np.tile(np.array([1.0, 1.0, 0.0], np.float32), (len(face), 1))
+        tilt = np.zeros((len(face), 2), np.float32)
         if self._materials:
             uv = interpolated(self.surface.uv, face, weights) if self.surface.uv is not None else None
             if uv is not None and moved is not None:
@@ -54,10 +57,14 @@ class OwnLook:
             for number, material in self._materials.items():
                 chosen = np.flatnonzero(of_place == number)
                 if len(chosen) and uv is not None:
-                    color[chosen], orm[chosen] = _shown(material, _footprint(uv[chosen], texel))
+                    place = _footprint(uv[chosen], texel)
+                    color[chosen], orm[chosen] = _shown(material, place)
+                    tilt[chosen] = _tilt(material, place)
+        if moved is not None:
+            tilt[moved[0]] = 0.0
         if self._colors is not None:
             color *= interpolated(self._colors[self.surface.faces], face, weights).astype(np.float32)
-        return color, orm
+        return color, orm, tilt
 
 
 def moved_places(
@@ -83,6 +90,14 @@ def _footprint(uv: Vectors, texel: tuple[float, float]) -> Footprint:
     across, down = np.zeros_like(uv), np.zeros_like(uv)
     across[:, 0], down[:, 1] = texel
     return Footprint(uv * (1.0, -1.0) + (0.0, 1.0), across, down)
+
+
+def _tilt(material: Material, place: Footprint) -> Floats | float:
+    if material.normal is None:
+        return 0.0
+    normal = 2.0 * material.normal.at(place) - 1.0
+    tilt: Floats = material.normal_scale * normal[:, :2] / np.maximum(normal[:, 2:], 0.1)
+    return tilt
 
 
 def _shown(material: Material, place: Footprint) -> tuple[Floats, Floats]:

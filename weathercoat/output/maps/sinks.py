@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from weathercoat.errors import UsageError
 from weathercoat.mesh.surface import Indices
 from weathercoat.output.maps.channels import MapKind, as_floats, quantised
-from weathercoat.output.maps.dress import Planes
+from weathercoat.output.maps.planes import Planes
 from weathercoat.output.maps.png import PngWriter, pack_rows
 
 _COMPRESSION = 1  # of PNG: higher levels take several times as long for a tenth of the bytes
