@@ -29,16 +29,18 @@ from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface,
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Place, Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
-from weathercoat.output.folder import PREVIEW, REPORT, TIMING, UNTOUCHED, RunFolder, kept_in
+from weathercoat.output.folder import PREVIEW, REPORT, SEVERITY, TIMING, UNTOUCHED, RunFolder, kept_in
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.report import (
     make_report,
     make_timing,
     manifest,
     measure_surface,
+    rounded,
     sha256,
     write_json,
 )
+from weathercoat.output.severity import write_table
 from weathercoat.plan import Plan, make_plan
 from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
 from weathercoat.resume import fingerprint, identify, read_finished, recorded_figures, take_up
@@ -158,6 +160,7 @@ def run_asset(
         if config.output.preview:
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
+        (folder / SEVERITY).write_text(write_table(rounded(recorder.figures)), newline="")
         report = _report(intake, meshed.notes, simulation, recorder, folder)
         report["fingerprint"] = fingerprint(loaded, intake.inputs)
         write_json(folder / REPORT, report)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from weathercoat.mesh.surface import Indices, Vectors, face_areas
-from weathercoat.output.report import find_openings
+from weathercoat.mesh.surface import Vectors, face_areas
+from weathercoat.output.cracks import find_openings, make_graph, rim_vertices
 from weathercoat.sim.snapshot import Snapshot
 
 PATTERN_FIGURES = (
@@ -44,14 +44,12 @@ def measure_pattern(snapshot: Snapshot) -> dict[str, float]:
     """
     areas = face_areas(snapshot.substrate_vertices, snapshot.substrate_faces)
     size = float(np.sqrt(areas.sum()))
-    ends, apart, at_loss = find_openings(snapshot)
-    open_half_edges = apart.copy()
-    open_half_edges[at_loss] = True
-    edges = np.unique(np.sort(ends[open_half_edges], axis=1), axis=0)
+    openings = find_openings(snapshot)
+    edges = openings.edges()
     return {
         **_graph_figures(edges, snapshot, size),
         "crack_spacing": _spacing(edges, snapshot, areas, size),
-        **_piece_figures(ends, open_half_edges, snapshot, areas, size),
+        **_piece_figures(openings.ends, openings.is_open(), snapshot, areas, size),
         "raised": _raised(snapshot, areas, size),
     }
 
@@ -61,32 +59,18 @@ def _graph_figures(edges: NDArray[np.int64], snapshot: Snapshot, size: float) ->
     if not len(edges):
         return {"junctions_three": 0.0, "junctions_four": 0.0, "straightness": 0.0, "dead_ends": 0.0}
     vertices = snapshot.substrate_vertices
-    tail, head = np.concatenate([edges, edges[:, ::-1]]).T
-    order = np.argsort(tail, kind="stable")
-    tail, head = tail[order], head[order]
-    along = vertices[head] - vertices[tail]
-    length = np.linalg.norm(along, axis=1)
-    along = along / np.maximum(length, np.finfo(np.float64).tiny)[:, None]
-    degree = np.bincount(tail, minlength=len(vertices))
+    graph = make_graph(edges, vertices)
+    degree, cosines = graph.degree, graph.straightness()
     on_pattern = np.count_nonzero(degree)
-    first = np.flatnonzero((degree[tail] == 2) & (np.diff(tail, prepend=-1) != 0))
-    cosines = -np.einsum("ij,ij->i", along[first], along[first + 1])
     is_rim = np.zeros(len(vertices), np.bool_)
-    is_rim[_rim_vertices(snapshot.substrate_faces)] = True
-    total = 0.5 * float(length.sum()) / size
+    is_rim[rim_vertices(snapshot.substrate_faces)] = True
+    total = 0.5 * float(graph.length.sum()) / size
     return {
         "junctions_three": float(np.count_nonzero(degree == 3) / on_pattern),
         "junctions_four": float(np.count_nonzero(degree > 3) / on_pattern),
         "straightness": float(cosines.mean()) if len(cosines) else 0.0,
         "dead_ends": float(np.count_nonzero((degree == 1) & ~is_rim) / total) if total > 0.0 else 0.0,
     }
-
-
-def _rim_vertices(faces: Indices) -> NDArray[np.int64]:
-    """The vertices of the edges that one face has alone."""
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
-    edges, uses = np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
-    return np.unique(edges[uses == 1])
 
 
 def _spacing(edges: NDArray[np.int64], snapshot: Snapshot, areas: Vectors, size: float) -> float:

@@ -99,6 +99,12 @@ def is_lifted(separated: NDArray[np.bool_], faces: Indices) -> NDArray[np.bool_]
     return (a + b + c) >= _LIFTED_CORNERS
 
 
+def percent_of(chosen: NDArray[np.bool_], area: Vectors) -> float:
+    """The share of the chosen faces (t,) in their area, in percent; 0 where there is no area."""
+    total = float(area.sum())
+    return 100.0 * float(area[chosen].sum()) / total if total > 0.0 else 0.0
+
+
 def corner_mean(values: Vectors, faces: Indices) -> Vectors:
     """The mean of the corners' values for each face, (m,)."""
     return (values[faces[:, 0]] + values[faces[:, 1]] + values[faces[:, 2]]) / 3.0

@@ -4,6 +4,7 @@ What lies in it:
 
     run.json        config, versions, inputs, notes and figures; the same bytes for the same input and seed
     timing.json     seconds by stage; the only file that differs from run to run
+    severity.csv    percent, sizes and grades of each snapshot, of the whole, each group and each part
     preview.png     contact sheet over time
     snapshots/      step_0100.ply and step_0100.glb for each recorded step
     checkpoint/     what `run --resume` goes on from (see `output.checkpoints`)
@@ -41,7 +42,7 @@ from weathercoat.output.exchange import exchange
 from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
-UNTOUCHED, CHECKPOINT = "untouched.ply", "checkpoint"
+UNTOUCHED, SEVERITY, CHECKPOINT = "untouched.ply", "severity.csv", "checkpoint"
 CHECKPOINT_STATE = f"{CHECKPOINT}/state.npz"  # there is nothing to go on from without it
 LONGEST_NAME = 255
 DEVICE_NAMES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # no files on Windows

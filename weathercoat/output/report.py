@@ -23,7 +23,9 @@ from weathercoat import __version__
 from weathercoat.errors import AccessError, CheckError, Note
 from weathercoat.lock import LOCK
 from weathercoat.mesh.surface import Indices, Surface, Vectors, face_areas
+from weathercoat.output.cracks import find_openings
 from weathercoat.output.folder import REPORT, TIMING
+from weathercoat.output.severity import measure_severity
 from weathercoat.sim.snapshot import Snapshot
 from weathercoat.target import target
 
@@ -50,11 +52,13 @@ def measure_snapshot(
     residual: float = 0.0,
     energy: float = 0.0,
     imbalance: float = 0.0,
+    millimetres: float | None = None,
 ) -> dict[str, Any]:
     """The figures of one snapshot.
 
-    flake_areas: rest area of every flake that has fallen so far; the others: how far
-    the film is from its constraints and from balance, as the simulation gives them. The result:
+    flake_areas: rest area of every flake that has fallen so far; the next four: how far the film is from its
+    constraints and from balance, as the simulation gives them; millimetres: the length of a unit of the
+    model, where it is known. The result:
 
     - separated_share: area of the film that has let go and not fallen, a face counting by its separated
     corners; - lost_area, lost_share: area of the film that has fallen; affected_share: the sum of both
@@ -62,7 +66,7 @@ def measure_snapshot(
     broken edge whose ends still hold together is not open and does not count. outline_length: length of the
     edges between film and lost film; - flakes: count, total, median and largest area, and the areas of the
     largest (at most 20); - film_rust, substrate_rust, dust: means by area, over the film that is left and
-    over the whole metal; - strain, residual, energy, imbalance.
+    over the whole metal; - strain, residual, energy, imbalance; - severity, see `severity.measure_severity`.
     """
     areas = face_areas(snapshot.substrate_vertices, snapshot.substrate_faces)
     total = float(areas.sum())
@@ -71,7 +75,8 @@ def measure_snapshot(
     has_fallen[snapshot.film_face] = False
     lost = float(areas[has_fallen].sum())
     separated = float((film_areas * snapshot.separated[snapshot.film_faces].mean(axis=1)).sum())
-    crack_length, outline_length = measure_openings(snapshot)
+    openings = find_openings(snapshot)
+    lengths = openings.lengths(snapshot)
     flakes = np.sort(np.asarray(flake_areas, np.float64).ravel())[::-1]
     return {
         "step": int(snapshot.step),
@@ -82,8 +87,8 @@ def measure_snapshot(
         "lost_area": lost,
         "lost_share": lost / total,
         "affected_share": (separated + lost) / total,
-        "crack_length": crack_length,
-        "outline_length": outline_length,
+        "crack_length": 0.5 * float(lengths[openings.apart].sum()),
+        "outline_length": float(lengths[openings.at_loss].sum()),
         "flakes": {
             "count": len(flakes),
             "area": float(flakes.sum()),
@@ -98,41 +103,8 @@ def measure_snapshot(
         "residual": float(residual),
         "energy": float(energy),
         "imbalance": float(imbalance),
+        "severity": measure_severity(snapshot, openings, millimetres),
     }
-
-
-def measure_openings(snapshot: Snapshot) -> tuple[float, float]:
-    """Rest length of the edges between two faces of the film that came apart, and between film and lost
-    film."""
-    ends, apart, at_loss = find_openings(snapshot)
-    places = snapshot.substrate_vertices[ends]
-    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
-    return 0.5 * float(length[apart].sum()), float(length[at_loss].sum())
-
-
-def find_openings(snapshot: Snapshot) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.intp]]:
-    """The half-edges of the film that lie at an opening.
-
-    The result: for each half-edge 3 f + i of the film's faces the vertices of the metal that it runs between
-    (3 m, 2); whether it has come apart from its twin (3 m,), which holds for both; the numbers of those whose
-    twin is lost.
-    """
-    count = len(snapshot.substrate_vertices)
-    faces = snapshot.film_faces
-    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    origin = snapshot.film_origin.astype(np.int64)
-    ends = np.stack([origin[tail], origin[head]], axis=1)
-    forward = ends[:, 0] * count + ends[:, 1]
-    backward = ends[:, 1] * count + ends[:, 0]
-    order = np.argsort(forward, kind="stable")
-    place, has_twin = _find(backward, forward[order])
-    twin = order[place]
-    apart = has_twin & ((tail != head[twin]) | (head != tail[twin]))
-
-    metal = snapshot.substrate_faces.astype(np.int64)
-    metal_edges = np.sort((metal * count + np.roll(metal, -1, axis=1)).ravel())
-    at_loss = np.flatnonzero(~has_twin)
-    return ends, apart, at_loss[_find(backward[at_loss], metal_edges)[1]]
 
 
 def measure_surface(surface: Surface) -> dict[str, Any]:
@@ -191,12 +163,12 @@ def make_report(
         "versions": versions(),
         "model": next(iter(inputs)),
         "inputs": {name: {"sha256": digest} for name, digest in inputs.items()},
-        "meshes": _rounded(meshes),
+        "meshes": rounded(meshes),
         "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],
-        "quality": _rounded(quality),
+        "quality": rounded(quality),
         "stopped": stopped,
-        "solver": _rounded(solver),
-        "snapshots": _rounded(snapshots),
+        "solver": rounded(solver),
+        "snapshots": rounded(snapshots),
         "files": dict(files),
     }
 
@@ -306,24 +278,16 @@ def _plain(value: Any, key: str, file: str) -> Any:
     raise CheckError(f"{key} is a {type(value).__name__}, which JSON has no form for", file=file)
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
     """Figures to 12 significant digits: those beyond are the round-off of sums, whose order differs from CPU
     to CPU."""
     if isinstance(value, Mapping):
-        return {name: _rounded(item) for name, item in value.items()}
+        return {name: rounded(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_rounded(item) for item in value]
+        return [rounded(item) for item in value]
     if isinstance(value, float):
         return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     return value
-
-
-def _find(keys: NDArray[np.int64], table: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Place of each key in a sorted table, and whether it is there."""
-    if not len(table):
-        return np.zeros(len(keys), np.intp), np.zeros(len(keys), np.bool_)
-    place = np.minimum(np.searchsorted(table, keys), len(table) - 1)
-    return place, table[place] == keys
 
 
 def _mean(values: Vectors, faces: Indices, areas: Vectors) -> float:

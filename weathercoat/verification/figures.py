@@ -15,6 +15,7 @@ from weathercoat.verification.findings import BrokenFileError, Ledger
 from weathercoat.verification.metal import Metal
 from weathercoat.verification.ply import PlySnapshot
 from weathercoat.verification.precision import DOUBLE, REPORTED, ROUNDINGS, SINGLE
+from weathercoat.verification.severity import check_condition, check_severity
 
 _REPORT = "run.json"
 _MOST_FLAKES = 20  # whose areas are listed
@@ -41,6 +42,7 @@ def check_row(ledger: Ledger, row: dict[str, Any]) -> bool:
         )
     take(row, "energy", float)
     _check_flakes(ledger, step, take(row, "flakes", dict))
+    check_severity(ledger, row)
     return True
 
 
@@ -56,6 +58,7 @@ def check_figures(
             abs(own - told) <= tolerance + REPORTED * abs(told),
             f"{key} of step {snapshot.step} is {told:.12g}, but {file} gives {own:.12g}",
         )
+    check_condition(ledger, file, row, snapshot, film, metal)
     left = float(metal.areas[film.over].sum())
     lost = take(row, "lost_area", float)
     ledger.expect(
