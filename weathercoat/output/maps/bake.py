@@ -19,7 +19,7 @@ from weathercoat.deform.team import Team
 from weathercoat.mesh.surface import Indices, Surface, Vectors
 from weathercoat.output.display import Normalisation
 from weathercoat.output.maps import planes as planes_of
-from weathercoat.output.maps.channels import MAPS, MapKind, map_kinds, with_range
+from weathercoat.output.maps.channels import MAPS, MapKind, fitted, map_kinds
 from weathercoat.output.maps.dress import dress
 from weathercoat.output.maps.film import FilmCover, find_seen, make_film_cover
 from weathercoat.output.maps.layout import Tile, make_layout, uv_areas
@@ -120,7 +120,7 @@ class Baker:
         self._normalise = Normalisation.of(snapshot)
         self._vertices = self._normalise(surface.vertices)
         self._rest = self._normalise(snapshot.substrate_vertices)
-        self._frames = make_frames(surface, self._vertices)
+        self.frames = make_frames(surface, self._vertices)
         self._ground = make_ground(self._rest, snapshot.substrate_faces, self._vertices, surface.faces)
         self._own = OwnLook(surface, is_painted, look.look)
         self._thickness = max(look.film_thickness, _LEAST_THICKNESS)
@@ -146,8 +146,10 @@ class Baker:
             np.stack([snapshot.film_rust, snapshot.separated, snapshot.separation_age], axis=1),
         )
         ranges = {planes_of.HEIGHT: (-self._thickness, state.highest)}
+        # reductions of a picture mix in what is around its charts: better paint than black
+        outside = {planes_of.RED + c: float(self._paint[c]) for c in range(3)}
         kinds = {
-            name: with_range(kind, ranges)
+            name: fitted(kind, ranges, outside)
             for name, kind in map_kinds(parameters.maps, parameters.packs).items()
         }
         team = Team(threads)
@@ -170,7 +172,7 @@ class Baker:
         team: Team,
     ) -> dict[str, Any]:
         width, height = parameters.width, parameters.height
-        steps = self._frames.along_u / width, self._frames.along_v / -height
+        steps = self.frames.along_u / width, self.frames.along_v / -height
         texel_size = np.sqrt(np.linalg.norm(np.cross(*steps), axis=1))
         sheet = _Sheet(tile, texel_corners(tile.uv, width, height), *steps, texel_size)
         files = {name: self._file_name(tile, name, parameters.format) for name in kinds}
@@ -258,7 +260,7 @@ class Baker:
         planes: Planes,
     ) -> None:
         """Fill the planes at the texels that are shown, and their relief at all, since it counts beside."""
-        film, snapshot, frames, metal = state.film, state.snapshot, self._frames, self._ground.faces
+        film, snapshot, frames, metal = state.film, state.snapshot, self.frames, self._ground.faces
         ground, where = locate(self._ground, face, weights, self._vertices, self.surface.faces)
         seen, seen_where = np.empty_like(face), np.zeros_like(weights)
         height, is_back = np.empty(face.shape, np.float32), np.empty(face.shape, np.bool_)

@@ -114,10 +114,11 @@ def map_kinds(maps: Sequence[str], packs: Sequence[tuple[str, tuple[str, ...]]])
     return kinds
 
 
-def with_range(kind: MapKind, ranges: Mapping[int, tuple[float, float]]) -> MapKind:
-    """The map with what 0 and 1 stand for in the planes whose range depends on the model."""
+def fitted(kind: MapKind, ranges: Mapping[int, tuple[float, float]], outside: Mapping[int, float]) -> MapKind:
+    """The map with what depends on the model: by plane, what 0 and 1 stand for, and the value outside."""
     channels = tuple(
-        Channel(c.plane, c.outside, *ranges.get(c.plane, (c.low, c.high))) for c in kind.channels
+        Channel(c.plane, outside.get(c.plane, c.outside), *ranges.get(c.plane, (c.low, c.high)))
+        for c in kind.channels
     )
     return MapKind(channels, kind.is_color)
 

@@ -66,6 +66,7 @@ def write_maps(
         write_model(
             folder / MODEL,
             baker.surface,
+            baker.frames,
             _pictures(baker, snapshot, parameters, about, folder, Path(scratch), threads),
         )
     return about

@@ -12,7 +12,7 @@ from weathercoat import __version__
 from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.glb import GlbBuffer, Material, Sheet, rotation_to_y, write_document
 from weathercoat.output.maps.layout import Tile
-from weathercoat.output.maps.tangents import shading_normals
+from weathercoat.output.maps.tangents import Frames
 from weathercoat.output.materials import face_materials
 from weathercoat.output.sheets import split_corners
 
@@ -27,8 +27,9 @@ class TilePictures(NamedTuple):
     pictures: Mapping[str, bytes]
 
 
-def write_model(path: Path, surface: Surface, tiles: Sequence[TilePictures]) -> None:
-    """Write the surface as GLB, y-up, with a node for each of its parts and a material for each tile.
+def write_model(path: Path, surface: Surface, frames: Frames, tiles: Sequence[TilePictures]) -> None:
+    """Write the surface as GLB, y-up, with a node for each of its parts, a material for each tile, and the
+    tangents that its normal maps are written in.
 
     Raises OSError where the file cannot be written.
     """
@@ -39,7 +40,6 @@ def write_model(path: Path, surface: Surface, tiles: Sequence[TilePictures]) -> 
     for number, (tile, _) in enumerate(tiles):
         tile_of[tile.faces], uv[tile.faces] = number, tile.uv
     names, owner = _parts(surface)
-    normals = shading_normals(surface)
     root: dict[str, Any] = {"name": "model", "translation": [float(x) for x in rotation @ center]}
     nodes: list[dict[str, Any]] = [root]
     meshes: list[dict[str, Any]] = []
@@ -47,8 +47,11 @@ def write_model(path: Path, surface: Surface, tiles: Sequence[TilePictures]) -> 
         primitives = []
         for number in np.unique(tile_of[owner == part]):
             chosen = np.flatnonzero((owner == part) & (tile_of == number))
-            sheet = _sheet(surface, chosen, normals, uv)
-            primitives.append({**buffer.add_sheet(sheet, center, rotation), "material": int(number)})
+            sheet, tangents = _sheet(surface, chosen, frames, uv)
+            primitive = buffer.add_sheet(sheet, center, rotation)
+            turned = np.einsum("ij,nj->ni", rotation, tangents[:, :3])
+            primitive["attributes"]["TANGENT"] = buffer.add(np.column_stack([turned, tangents[:, 3]]), "VEC4")
+            primitives.append({**primitive, "material": int(number)})
         if primitives:
             nodes.append({"name": name, "mesh": len(meshes)})
             meshes.append({"name": name, "primitives": primitives})
@@ -82,12 +85,27 @@ def _parts(surface: Surface) -> tuple[list[str], Any]:
     return list(surface.groups), surface.face_group
 
 
-def _sheet(surface: Surface, chosen: Any, normals: Vectors, uv: Vectors) -> Sheet:
+def _sheet(surface: Surface, chosen: Any, frames: Frames, uv: Vectors) -> tuple[Sheet, Vectors]:
+    """The chosen faces (k,) as a sheet, and the tangents of its vertices with their handedness, (n, 4)."""
     part = surface.select_faces(np.isin(np.arange(len(surface.faces)), chosen))
-    values = np.concatenate([normals[chosen], uv[chosen]], axis=2)
-    faces, source, values = split_corners(part.faces, values, len(part.vertices))
+    signs = np.repeat(frames.signs[chosen], 3).reshape(-1, 3, 1)
+    each = np.concatenate([frames.normals[chosen], uv[chosen], frames.tangents[chosen], signs], axis=2)
+    faces, source, values = split_corners(part.faces, each, len(part.vertices))
     unused = Material("", metallic=1.0, roughness=1.0, double_sided=True)
-    return Sheet(unused, part.vertices[source], faces, normals=values[:, :3], uv=values[:, 3:])
+    sheet = Sheet(unused, part.vertices[source], faces, normals=values[:, :3], uv=values[:, 3:5])
+    return sheet, _upright(values[:, 5:8], values[:, :3], values[:, 8])
+
+
+def _upright(tangents: Vectors, normals: Vectors, signs: Vectors) -> Vectors:
+    """Unit tangents at right angles to the normals, whatever these are where there are none, (n, 4)."""
+    along = tangents - np.einsum("ij,ij->i", tangents, normals)[:, None] * normals
+    spare = np.where(np.abs(normals[:, :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    spare = np.cross(normals, spare)
+    lacking = np.linalg.norm(along, axis=1) < 1e-6
+    along[lacking] = spare[lacking]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.divide(along, length, out=np.tile([1.0, 0.0, 0.0], (len(along), 1)), where=length > 0.0)
+    return np.column_stack([along, signs])
 
 
 def _material(
