@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from weathercoat.cli.bake import prepare_baker
+from weathercoat.baking import prepare_baker
 from weathercoat.comparison.flip import flip_map
 from weathercoat.finished import FinishedRun, open_run
 from weathercoat.output.display import (
@@ -35,6 +35,7 @@ from weathercoat.output.materials import make_material
 from weathercoat.output.pictures import PictureParameters, frame_camera, render_mesh
 from weathercoat.output.shading import to_linear
 from weathercoat.recording import picture_parameters
+from weathercoat.run import painted_faces
 from weathercoat.sim.snapshot import Snapshot
 
 SIDES = (32.0, 152.0, 272.0)
@@ -103,7 +104,14 @@ def main() -> None:
     for run in arguments.runs:
         finished = open_run(run)
         surface = finished.read_model(arguments.model)
-        baker = prepare_baker(finished, surface, size=arguments.size, atlas=surface.uv is None)
+        baker = prepare_baker(
+            surface,
+            painted_faces(surface, finished.config),
+            finished.read_snapshot(),
+            finished.config,
+            up=finished.up,
+            atlas_size=arguments.size if surface.uv is None else None,
+        )
         for step in finished.steps:
             snapshot = finished.read_snapshot(step)
             values = []
@@ -114,8 +122,8 @@ def main() -> None:
             away = np.linalg.norm(snapshot.film_vertices - rest, axis=1) / baker.size
             lift = away[snapshot.separated].mean() if snapshot.separated.any() else 0.0
             print(
-                f"{run.name:20} {step:6} {values[0]:6.2f} {values[1]:6.3f} {values[2]:11.2f} {values[3]:11.3f} "
-                f"{lift:7.4f}",
+                f"{run.name:20} {step:6} {values[0]:6.2f} {values[1]:6.3f} {values[2]:11.2f} "
+                f"{values[3]:11.3f} {lift:7.4f}",
                 flush=True,
             )
 

@@ -236,7 +236,7 @@ class TextureCoordinatesError(SurfaceError):
     """The model has no texture coordinates that maps can be made on."""
 
     code = "E-UV"
-    remedy = "give --atlas, which lays out new ones"
+    remedy = "give --atlas to `bake`, or maps.atlas in the config, which lays out new ones"
 
 
 class LimitError(WeathercoatError):

@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from weathercoat.baking import require_maps, write_run_maps
 from weathercoat.compile import Compiling, remove_unused, watch_compiling
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
@@ -58,6 +59,7 @@ _AROUND = (
     "checkpoint",
     "write",
     "pictures",
+    "maps",
     "check",
 )  # what is timed beside the steps
 # The key of the environment that each parameter is multiplied with.
@@ -161,6 +163,10 @@ def run_asset(
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
         (folder / SEVERITY).write_text(write_table(rounded(recorder.figures)), newline="")
+        if config.maps.when != "never":
+            with watch.time("maps"):
+                is_painted = painted_faces(intake.surface, config)
+                write_run_maps(folder, intake.surface, is_painted, config, threads=threads)
         report = _report(intake, meshed.notes, simulation, recorder, folder)
         report["fingerprint"] = fingerprint(loaded, intake.inputs)
         write_json(folder / REPORT, report)
@@ -190,6 +196,7 @@ def _take_in(
     with name_errors(name):
         report_notes(surface.notes, name, say, strict=strict)
         painted, untouched = split_paint(surface, loaded.config)
+        require_maps(surface, loaded.config)
         require_masks(loaded.config.steering, painted, loaded.origins["steering"])
         plan = make_plan(loaded, painted, len(surface.faces))
         require_memory(plan.loaded.config, plan.model_faces, limit)

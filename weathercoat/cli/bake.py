@@ -14,11 +14,9 @@ from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
     from weathercoat.finished import FinishedRun
-    from weathercoat.mesh.surface import Surface
     from weathercoat.output.maps.bake import Baker, MapParameters
 
 _MOST = 16_384
-_SIZE_PER_GAP = 256  # charts of an atlas are this share of its size apart: 8 texels at 2048
 _SIZE = re.compile(r"(\d{1,5})(?:x(\d{1,5}))?")
 
 
@@ -116,6 +114,7 @@ def command(
 
     Beside the maps lie maps.json, which says how to read them, and model.glb, the model that wears them.
     """
+    from weathercoat.baking import ATLAS, prepare_baker, summary
     from weathercoat.cli.messages import Messages
     from weathercoat.finished import open_run
     from weathercoat.output.folder import RunFolder
@@ -123,7 +122,7 @@ def command(
     from weathercoat.output.maps.channels import MAPS, map_kinds, parse_pack
     from weathercoat.output.maps.folder import MAPS_REPORT
     from weathercoat.output.meshes import write_mesh
-    from weathercoat.run import report_compiling
+    from weathercoat.run import painted_faces, report_compiling
 
     names = tuple(MAPS) if maps is None else tuple(name.strip() for name in maps.split(",") if name.strip())
     parameters = MapParameters(
@@ -140,9 +139,17 @@ def command(
     finished = open_run(run)
     folder = RunFolder(output, overwrite=overwrite, marker=MAPS_REPORT)
     with Messages(quiet=quiet or as_json) as messages, report_compiling(messages.log), folder as target:
-        baker = prepare_baker(finished, finished.read_model(model), size=min(size), atlas=atlas)
+        surface = finished.read_model(model)
+        baker = prepare_baker(
+            surface,
+            painted_faces(surface, finished.config),
+            finished.read_snapshot(),
+            finished.config,
+            up=finished.up,
+            atlas_size=min(size) if atlas else None,
+        )
         if atlas:
-            write_mesh(target / "atlas.obj", baker.surface)
+            write_mesh(target / ATLAS, baker.surface)
         written = _bake(finished, step, baker, parameters, target, threads or options.threads_beside(1))
         if step == "all":
             from weathercoat.output.report import write_json
@@ -151,23 +158,8 @@ def command(
     if as_json:
         click.echo(json.dumps(written if step == "all" else written[0], indent=2, ensure_ascii=False))
     elif not quiet:
-        _say(output, written)
-
-
-def prepare_baker(finished: FinishedRun, surface: Surface, *, size: int, atlas: bool) -> Baker:
-    """What bakes the snapshots of a run onto its model, with texture coordinates of its own for `atlas`, laid
-    out for maps of `size` texels.
-    """
-    from weathercoat.output.maps.atlas import make_atlas
-    from weathercoat.output.maps.bake import Baker
-    from weathercoat.recording import picture_parameters
-    from weathercoat.run import painted_faces
-
-    is_painted = painted_faces(surface, finished.config)
-    if atlas:
-        surface = make_atlas(surface, size=size, padding=max(2, size // _SIZE_PER_GAP))
-    look = picture_parameters(finished.config)
-    return Baker(surface, is_painted, finished.read_snapshot(), look, up=finished.up)
+        pictures = sum(len(tile["files"]) for about in written for tile in about["tiles"])
+        click.echo("\n".join([f"written to {output}: {pictures} maps", *summary(written)]))
 
 
 def _bake(
@@ -191,19 +183,3 @@ def _bake(
         place.mkdir()
         written.append(write_maps(baker, finished.read_snapshot(number), parameters, place, threads=threads))
     return written
-
-
-def _say(output: Path, written: list[dict[str, Any]]) -> None:
-    """Say what was written, and what is odd about the texture coordinates."""
-    tiles = written[0]["tiles"]
-    pictures = sum(len(tile["files"]) for about in written for tile in about["tiles"])
-    click.echo(f"written to {output}: {pictures} maps")
-    mirrored = sum(tile["mirrored_faces"] for tile in tiles)
-    overlapping = max(tile["overlapping_share"] for tile in tiles)
-    if mirrored:
-        click.echo(f"{mirrored:,} faces show their texture mirrored; their normals are turned to suit")
-    if overlapping > 0.0:
-        click.echo(
-            f"{overlapping:.1%} of the texels belong to several faces, and show the first: "
-            "give --atlas for a place of its own for each"
-        )

@@ -76,6 +76,10 @@ def _remesh_tag(value: object) -> str:
     return "off" if value is False else "mapping"
 
 
+MapName = Literal[
+    "base_color", "orm", "normal", "height", "bare", "rust", "dirt", "crack", "lift", "separated", "age"
+]
+_MAP_SCHEMA = {"type": "string", "enum": [*get_args(MapName)]}
 _FORMAT_SCHEMA = {"type": "string", "enum": ["ply", "glb"]}
 
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
@@ -470,6 +474,26 @@ class Output(Section):
     picture_height: Whole = parameter(480, "Height of a picture", unit="pixels", ge=16, le=16_384)
 
 
+class Maps(Section):
+    """Maps on the model's own texture coordinates, in the folder `maps` of the run; see docs/maps.md."""
+
+    when: Literal["never", "last", "snapshots"] = parameter(
+        "never", "Which states are baked: none, that of the last snapshot, or those of all"
+    )
+    names: Annotated[
+        tuple[MapName, ...],
+        BeforeValidator(at_least_one_word),
+        WithJsonSchema({"anyOf": [_MAP_SCHEMA, {"type": "array", "items": _MAP_SCHEMA}]}),
+    ] = parameter(get_args(MapName), "Which maps are written")
+    width: Whole = parameter(2048, "Width of a map", unit="texels", ge=1, le=16_384)
+    height: Whole = parameter(2048, "Height of a map", unit="texels", ge=1, le=16_384)
+    format: Literal["png", "exr"] = parameter("png", "Format of the maps; EXR has half floats")
+    bits: Literal[8, 16] = parameter(8, "Bits of a channel, in PNG")
+    padding: Whole = parameter(16, "How far charts go on beyond their edges", unit="texels", ge=0, le=1024)
+    pack: Names = parameter((), "Further maps of several channels, such as R=rust,G=dirt,B=bare,A=crack")
+    atlas: Switch = parameter(False, "Lay out texture coordinates anew, and write the model with them")
+
+
 RemeshOrOff = Annotated[
     Annotated[Remesh, Tag("mapping")] | Annotated[Literal[False], Tag("off"), WithJsonSchema(SWITCH_SCHEMA)],
     Discriminator(_remesh_tag),
@@ -515,6 +539,7 @@ class Config(Section):
     snapshots: Snapshots = Snapshots()
     checkpoint: Checkpoint = Checkpoint()
     output: Output = Output()
+    maps: Maps = Maps()
     steering: tuple[Steer, ...] = parameter(
         (), "Parameters changed place by place and over time, one after the other; see docs/steering.md"
     )
@@ -533,6 +558,8 @@ class Config(Section):
         if scene.pixels_per_metre is not None and (scene.distance or scene.nearest):
             found.append(("scene.pixels_per_metre", "give it or the distance of a camera, not both"))
         found += unused_values(self.physical)
+        if self.maps.when != "never" and "ply" not in self.output.formats:
+            found.append(("maps.when", "maps are made of snapshots in PLY; add ply to output.formats"))
         if self.quality == "auto" and scene.pixels_per_unit() is None:
             found.append(("quality", "auto needs scene.distance, scene.nearest or scene.pixels_per_metre"))
         return found

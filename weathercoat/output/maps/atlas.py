@@ -16,12 +16,8 @@ def make_atlas(surface: Surface, *, size: int, padding: int) -> Surface:
 
     Raises UsageError where xatlas is not installed, or lays out nothing.
     """
-    try:
-        import xatlas
-    except ImportError as error:
-        raise UsageError(
-            "an atlas needs the package xatlas", remedy="pip install 'weathercoat[atlas]'"
-        ) from error
+    require_atlas()
+    import xatlas
 
     atlas = xatlas.Atlas()
     atlas.add_mesh(surface.vertices.astype(np.float32), surface.faces.astype(np.uint32))
@@ -35,3 +31,13 @@ def make_atlas(surface: Surface, *, size: int, padding: int) -> Surface:
     placed = uv.astype(np.float64)[corner]
     parts = tuple(replace(part, material=-1) for part in surface.parts)
     return replace(surface, uv=placed, parts=parts, materials=())
+
+
+def require_atlas() -> None:
+    """Raise UsageError where no atlas can be laid out."""
+    try:
+        import xatlas  # noqa: F401
+    except ImportError as error:
+        raise UsageError(
+            "an atlas needs the package xatlas", remedy="pip install 'weathercoat[atlas]'"
+        ) from error
