@@ -8,6 +8,7 @@ from pathlib import Path
 
 from weathercoat.config.load import load_config
 from weathercoat.errors import OutputError
+from weathercoat.masks.files import mask_source
 from weathercoat.mesh.read import read_surface
 from weathercoat.mesh.remesh import RemeshParameters
 from weathercoat.mesh.remesh import remesh as remesh_surface
@@ -60,9 +61,7 @@ def simulate(
     """
     plan = make_plan(load_config(config, overrides), surface, len(surface.faces))
     loaded = plan.loaded
-    simulation = prepare_simulation(
-        surface, loaded.config, threads=threads, masks_of=loaded.origins["steering"]
-    )
+    simulation = prepare_simulation(surface, loaded.config, threads=threads, masks=mask_source(loaded))
     run_simulation(simulation, [], progress, until=round(until * simulation.steps))
     return simulation
 

@@ -23,7 +23,7 @@ from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, Weat
 from weathercoat.film.state import FilmParameters
 from weathercoat.lock import LOCK
 from weathercoat.masks.evaluate import make_changes, require_masks
-from weathercoat.masks.files import hash_masks
+from weathercoat.masks.files import NO_MASKS, MaskSource, hash_masks, mask_source
 from weathercoat.memory import MemoryLimit, memory_limit
 from weathercoat.mesh.frame import make_frame
 from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface, side_files
@@ -142,7 +142,7 @@ def run_asset(
         report_notes(meshed.notes[len(intake.surface.notes) :], intake.name, say, strict=strict)
         with name_errors(intake.name), watch.time("prepare"):
             simulation = prepare_simulation(
-                meshed, config, intake.painted, threads=threads, masks_of=loaded.origins["steering"]
+                meshed, config, intake.painted, threads=threads, masks=mask_source(loaded)
             )
 
         recorder = SnapshotRecorder(folder, config, intake.untouched, watch)
@@ -374,14 +374,13 @@ def prepare_simulation(
     painted: Surface | None = None,
     *,
     threads: int = 1,
-    masks_of: str = "",
+    masks: MaskSource = NO_MASKS,
 ) -> Simulation:
     """A simulation of a surface by a config, at age 0.
 
     painted: the surface before remeshing, whose frame places noise and defects, so that they lie alike at
-    every resolution. masks_of: where `steering` came from, `FILE:LINE` or an option: the files of its masks
-    lie beside it. Raises CheckError where the surface is no oriented manifold, and ConfigError where a mask
-    does not fit it.
+    every resolution. masks: where `steering` and its files are from. Raises CheckError where the surface is
+    no oriented manifold, and ConfigError where a mask does not fit it.
     """
     colors = config.appearance
     try:
@@ -404,7 +403,7 @@ def prepare_simulation(
     except ValueError as error:
         raise CheckError(f"the mesh for the simulation is no manifold: {error}", file=surface.name) from error
     if config.steering:
-        simulation.steer(make_changes(config.steering, simulation, masks_of))
+        simulation.steer(make_changes(config.steering, simulation, masks))
     return simulation
 
 

@@ -24,6 +24,7 @@ SUBCOMMANDS = (
     "inspect",
     "remesh",
     "render",
+    "risk",
     "bake",
     "verify",
     "compare",

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat.config.steering import Lines, Mask, Steer
-from weathercoat.masks.files import mask_folder, problem, read_lines, read_picture, segments
+from weathercoat.masks.files import MaskSource, problem, read_lines, read_picture, segments
 from weathercoat.masks.geometry import (
     along_up,
     distance_to,
@@ -46,14 +46,13 @@ def require_masks(entries: Sequence[Steer], surface: Surface, origin: str) -> No
                 )
 
 
-def make_changes(entries: Sequence[Steer], simulation: Simulation, origin: str) -> list[Change]:
-    """The changes that entries make of a simulation, in their order.
+def make_changes(entries: Sequence[Steer], simulation: Simulation, source: MaskSource) -> list[Change]:
+    """The changes that entries from a source make of a simulation, in their order.
 
-    origin: where the entries came from, `FILE:LINE` or an option; files lie beside that file. Raises
-    ConfigError where a mask cannot be evaluated.
+    Raises ConfigError where a mask cannot be evaluated.
     """
-    require_masks(entries, simulation.surface, origin)
-    evaluation = _Evaluation(simulation, origin, mask_folder(origin))
+    require_masks(entries, simulation.surface, source.origin)
+    evaluation = _Evaluation(simulation, source.origin, source.folder)
     return [
         Change(entry.name, evaluation.mask_of(entry, f"steering[{number}]"), entry.set is None, entry.keys)
         for number, entry in enumerate(entries)

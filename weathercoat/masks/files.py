@@ -8,11 +8,13 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from weathercoat.config.load import LoadedConfig
 from weathercoat.config.presets import presets_folder
+from weathercoat.config.schema import Config
 from weathercoat.errors import ConfigError, ConfigProblem
 from weathercoat.mesh.surface import Vectors
 from weathercoat.output.report import sha256
@@ -28,12 +30,24 @@ def problem(origin: str, key: str, what: str) -> ConfigError:
     return ConfigError(problems=(ConfigProblem(where, line, key, what),))
 
 
-def mask_folder(origin: str) -> Path:
-    """The folder that names of files are relative to: that of the config that holds `steering`."""
+class MaskSource(NamedTuple):
+    """Where `steering` came from, `FILE:LINE` or an option, and the folder in which its files lie."""
+
+    origin: str
+    folder: Path
+
+
+NO_MASKS = MaskSource("", Path())
+
+
+def mask_source(loaded: LoadedConfig) -> MaskSource:
+    """The source of a config: names of files are relative to the file that holds `steering`."""
+    origin = loaded.origins["steering"]
     where, _ = _split(origin)
     if where.startswith("preset "):
-        return presets_folder()
-    return Path(where).parent if os.path.isfile(where) else Path()  # noqa: PTH113 (any text will do)
+        return MaskSource(origin, presets_folder())
+    is_file = os.path.isfile(where)  # noqa: PTH113 (any text will do)
+    return MaskSource(origin, Path(where).parent if is_file else Path())
 
 
 def _split(origin: str) -> tuple[str, int]:
@@ -41,19 +55,23 @@ def _split(origin: str) -> tuple[str, int]:
     return (found[1], int(found[2])) if found else (origin, 0)
 
 
-def named_files(loaded: LoadedConfig) -> Iterator[tuple[str, str]]:
+def _named_files(config: Config) -> Iterator[tuple[str, str]]:
     """The number of the entry, as a key, and the name of each file that `steering` needs."""
-    for number, entry in enumerate(loaded.config.steering):
+    for number, entry in enumerate(config.steering):
         for name in entry.files():
             yield f"steering[{number}]", name
 
 
 def hash_masks(loaded: LoadedConfig) -> dict[str, str]:
     """SHA-256 of the files that `steering` needs, by `steering/NAME`; ConfigError where one is missing."""
-    origin = loaded.origins["steering"]
-    found = {}
-    for key, name in named_files(loaded):
-        path = mask_folder(origin) / name
+    return hash_files(loaded.config, mask_source(loaded))
+
+
+def hash_files(config: Config, source: MaskSource) -> dict[str, str]:
+    """As `hash_masks`, of a config whose files lie in the folder of a source."""
+    origin, found = source.origin, {}
+    for key, name in _named_files(config):
+        path = source.folder / name
         try:
             if path.stat().st_size > _MOST_BYTES:
                 raise problem(origin, key, f"{path} is larger than {_MOST_BYTES // 2**20} MB")
