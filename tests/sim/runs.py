@@ -83,6 +83,7 @@ LITERAL_FILM = {
     "fracture_rounds": "one",
     "flaking_rule": "faces",
 }
+STILL = {"deformation_solver": "none"}  # nothing moves
 LITERAL_CURL = {"curl_rule": "angle", "deformation_angle": "split"}
 
 
