@@ -27,7 +27,7 @@ from weathercoat.output.pictures import (
     write_png,
 )
 from weathercoat.output.report import measure_snapshot
-from weathercoat.output.snapshots import write_snapshot_glb, write_snapshot_ply
+from weathercoat.output.snapshots import Look, write_snapshot_glb, write_snapshot_ply
 from weathercoat.sim.checkpoint import restore_state, state_arrays
 from weathercoat.sim.simulation import Simulation
 from weathercoat.sim.snapshot import Snapshot
@@ -93,6 +93,7 @@ class SnapshotRecorder:
                 snapshot,
                 thickness=self.config.appearance.thickness * simulation.frame.size,
                 back_color=unit_color(self.config.appearance.back),
+                look=Look(self.config.appearance.look, unit_color(self.config.appearance.rust)),
                 up=simulation.surface.up,
                 untouched=self.untouched,
             )
@@ -188,6 +189,7 @@ def picture_parameters(config: Config) -> PictureParameters:
     """How the pictures of a run are taken."""
     colors = config.appearance
     return PictureParameters(
+        look=colors.look,
         width=config.output.picture_width,
         height=config.output.picture_height,
         film_thickness=colors.thickness,

@@ -209,8 +209,8 @@ def _mesh(intake: _Intake, checkpoint: Checkpoint | None, folder: Path) -> Surfa
     """The surface to simulate: the one that the checkpoint is of, or as the config wants it."""
     config = intake.plan.loaded.config
     if checkpoint and config.remesh:
-        kept = read_kept_surface(folder)
-        return replace(kept, parts=intake.surface.parts, materials=intake.surface.materials)
+        kept, model = read_kept_surface(folder), intake.surface
+        return replace(kept, parts=model.parts, materials=model.materials, tree=model.tree)
     return placed_on(intake.surface, intake.painted, remesh_painted(intake.painted, config))
 
 

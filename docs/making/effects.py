@@ -113,6 +113,7 @@ WITHOUT_PICTURE: dict[str, str] = {
     "model.up": "turns where rust runs and dust lies, with the model",
     "paint.only": "parts that it leaves out are drawn as they came",
     "paint.except": "parts that it leaves out are drawn as they came",
+    "appearance.look": "whether the model's own textures show",
     "appearance.paint": "a colour",
     "appearance.back": "a colour",
     "appearance.metal": "a colour",

@@ -96,9 +96,10 @@ class Glb:
         self.binary = bytearray(content[28 + length :])
 
     def primitive(self, node: str, number: int = 0) -> dict[str, Any]:
-        """A primitive of the mesh of a node."""
-        (mesh,) = (mesh for mesh in self.document["meshes"] if mesh["name"] == node)
-        found: dict[str, Any] = mesh["primitives"][number]
+        """A primitive of the film or the substrate."""
+        roles = ("film", "back", "rim") if node == "film" else (node,)
+        every = (primitive for mesh in self.document["meshes"] for primitive in mesh["primitives"])
+        found: dict[str, Any] = [p for p in every if p["extras"]["role"] in roles][number]
         return found
 
     def array(self, accessor: int) -> NDArray[Any]:

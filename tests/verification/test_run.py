@@ -232,6 +232,13 @@ def set_accessor(key: str, change: Callable[[Any], Any]) -> Edit:
     return edit
 
 
+def set_role(document: dict[str, Any], role: str, other: str) -> None:
+    for mesh in document["meshes"]:
+        for primitive in mesh["primitives"]:
+            if primitive["extras"]["role"] == role:
+                primitive["extras"]["role"] = other
+
+
 def set_glb(change: Callable[[dict[str, Any]], None]) -> Edit:
     def edit(run: Path) -> None:
         glb = Glb(run / f"{LAST}.glb")
@@ -325,11 +332,11 @@ def misdirect_sheet(ply: Ply) -> None:
         ),
         (set_accessor("componentType", lambda kind: 5123), "glb", "holds not what it is used for"),
         (set_glb(lambda d: d["asset"]["extras"].update(step=61)), "time", "is of step 61, age 1.0, but"),
-        (set_glb(lambda d: d["nodes"][0]["translation"].pop()), "glb", "moved by no three numbers"),
-        (set_glb(lambda d: d["nodes"][1].update(name="fim")), "glb-nodes", "its first nodes are"),
+        (set_glb(lambda d: d["nodes"][0].update(translation=[1, 2])), "glb", "moved by no 3 numbers"),
+        (set_glb(lambda d: set_role(d, "film", "fim")), "glb-counts", "the film has"),
         (set_glb(lambda d: d.update(buffers=[])), "glb", r"its buffer is not the [\d,]+ bytes of the binary"),
-        (set_glb(lambda d: d.update(nodes=[])), "glb", "holds no nodes.0"),
-        (set_glb(lambda d: d["meshes"][2].update(primitives=[])), "glb-counts", "have 0 faces instead of 1"),
+        (set_glb(lambda d: d.update(nodes=[])), "glb", "its nodes are no tree"),
+        (set_glb(lambda d: set_role(d, "untouched", "rim")), "glb-counts", "have 0 faces instead of 1"),
         (set_sheet(nudge_sheet), "finite", "the position of vertex 1 is not finite"),
         (set_sheet(misdirect_sheet), "indices", r"face 0 has corners \[0, 1, -1\], but there are 3"),
     ],

@@ -401,6 +401,11 @@ class Physical(Section):
 class Appearance(Section):
     """Colours (sRGB) and the drawn thickness of the film."""
 
+    look: Literal["auto", "model", "paint"] = parameter(
+        "auto",
+        "What the outer side of the film shows: the model's own materials where they have a picture, or "
+        "wherever there are any, or the paint below",
+    )
     paint: Color = parameter((58, 120, 134), "Outer side of the film")
     back: Color = parameter((188, 178, 160), "Inner side of the film, the primer")
     metal: Color = parameter((122, 124, 126), "Metal without rust")

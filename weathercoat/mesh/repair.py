@@ -127,6 +127,7 @@ def repair(
         face_part=None if polygons.face_part is None else polygons.face_part[polygon[source]],
         parts=polygons.parts,
         materials=polygons.materials,
+        tree=polygons.tree,
         colors=None if polygons.colors is None else polygons.colors[origin],
         up=up,
         notes=tuple(notes),

@@ -4,7 +4,9 @@ simulation.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +76,8 @@ class Surface:
     gravity, in the model's axes. notes: repairs that were made and what could not be kept. place: where each
     vertex lies on the input surface; None for the input itself. normals: float64 (m, 3, 3), the unit shading
     normal of each corner, or None where the input has none. face_part: int32 (m,), for each face an index
-    into `parts`, or None where nothing is known of parts; materials: those of the parts.
+    into `parts`, or None where nothing is known of parts; materials: those of the parts. tree: the nodes of
+    glTF that the parts name by number, with their names, transforms and children; empty for other formats.
     """
 
     vertices: Vectors
@@ -90,6 +93,7 @@ class Surface:
     face_part: Indices | None = None
     parts: tuple[Part, ...] = ()
     materials: tuple[SourceMaterial, ...] = ()
+    tree: tuple[Mapping[str, Any], ...] = ()
     name: str = "model"
     format: str = ""
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weathercoat import __version__
+from weathercoat.mesh.formats.gltf_materials import texture_places
+from weathercoat.mesh.materials import SourceMaterial, Texture
 from weathercoat.mesh.surface import Indices, Vectors
 
 FLOAT, UINT32 = 5126, 5125
@@ -24,22 +27,27 @@ VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 
 @dataclass(frozen=True)
 class Material:
-    """A metallic-roughness material; `base_color` is linear RGB and multiplies the vertex colours."""
+    """A metallic-roughness material; `base_color` is linear RGB and multiplies the vertex colours.
+
+    source: a material of the input that counts instead of all but the name and `double_sided`.
+    """
 
     name: str
     metallic: float
     roughness: float
     double_sided: bool
     base_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    source: SourceMaterial | None = None
 
 
 @dataclass(frozen=True)
 class Sheet:
     """Triangles of one material, k vertices and m faces: a primitive of glTF.
 
-    vertices (k, 3), in the axes of the model; faces (m, 3); normals (k, 3), unit; colors (k, 3), linear RGB 0
-    to 1, or None; uv (k, 2), origin at the lower left as in OBJ, or None; scalars: custom attributes (k,),
-    whose names begin with an underscore.
+    vertices (k, 3), in the axes of the model; faces (m, 3); normals (k, 3), unit; colors (k, 3), linear RGB
+    0 to 1, or None; uv (k, 2), origin at the lower left as in OBJ, or None; scalars: custom attributes
+    (k,), whose names begin with an underscore. role: what it is of a snapshot, `film`, `back`, `rim`,
+    `substrate` or `untouched`; part: the number in `Surface.parts` of what it is of, or -1.
     """
 
     material: Material
@@ -49,6 +57,8 @@ class Sheet:
     colors: Vectors | None = None
     uv: Vectors | None = None
     scalars: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    role: str = ""
+    part: int = -1
 
 
 @dataclass(frozen=True)
@@ -78,17 +88,14 @@ def write_glb(
     root: dict[str, Any] = {"name": "model", "translation": [float(x) for x in rotation @ center]}
     entries: list[dict[str, Any]] = [root]
     meshes: list[dict[str, Any]] = []
-    materials: list[Material] = []
+    materials = MaterialTable(buffer)
     for node in nodes:
         entry: dict[str, Any] = {"name": node.name}
         sheets = [sheet for sheet in node.sheets if len(sheet.faces)]
         primitives = []
         for sheet in sheets:
-            if sheet.material not in materials:
-                materials.append(sheet.material)
-            primitives.append(
-                {**buffer.add_sheet(sheet, center, rotation), "material": materials.index(sheet.material)}
-            )
+            number = materials.number(sheet.material)
+            primitives.append({**buffer.add_sheet(sheet, center, rotation), "material": number})
         if primitives:
             entry["mesh"] = len(meshes)
             meshes.append({"name": node.name, "primitives": primitives})
@@ -103,7 +110,7 @@ def write_glb(
     }
     if meshes:
         document["meshes"] = meshes
-        document["materials"] = [material_entry(material) for material in materials]
+        materials.add_to(document)
         document["accessors"] = buffer.accessors
         document["bufferViews"] = buffer.views
         document["buffers"] = [{"byteLength": buffer.length}]
@@ -156,7 +163,10 @@ class GlbBuffer:
             attributes["TEXCOORD_0"] = self.add(sheet.uv * (1.0, -1.0) + (0.0, 1.0), "VEC2")
         for name, values in sheet.scalars.items():
             attributes[name] = self.add(values, "SCALAR")
-        return {"attributes": attributes, "indices": self.add_indices(sheet.faces)}
+        primitive: dict[str, Any] = {"attributes": attributes, "indices": self.add_indices(sheet.faces)}
+        if sheet.role:
+            primitive["extras"] = {"role": sheet.role, **({"part": sheet.part} if sheet.part >= 0 else {})}
+        return primitive
 
     def add(
         self, values: NDArray[Any], kind: str, *, bounds: bool = False, target: int | None = VERTEX_TARGET
@@ -191,6 +201,84 @@ class GlbBuffer:
         view = self.add_bytes(content) if target is None else self.add_bytes(content, target=target)
         self.accessors.append({"bufferView": view, **accessor})
         return len(self.accessors) - 1
+
+
+class MaterialTable:
+    """The materials of a document, with the textures that they show, whose pictures go into the buffer."""
+
+    def __init__(self, buffer: GlbBuffer) -> None:
+        self.buffer = buffer
+        self.entries: list[dict[str, Any]] = []
+        self.textures: list[dict[str, Any]] = []
+        self.images: list[dict[str, Any]] = []
+        self.samplers: list[dict[str, Any]] = []
+        self.extensions: set[str] = set()
+        self._pictures: list[bytes] = []
+        self._known: list[Material] = []
+
+    def number(self, material: Material) -> int:
+        """The number of a material, which is added where it is new."""
+        if material not in self._known:
+            self._known.append(material)
+            self.entries.append(
+                material_entry(material) if material.source is None else self._own(material, material.source)
+            )
+        return self._known.index(material)
+
+    def add_to(self, document: dict[str, Any]) -> None:
+        """Put the lists into a document that has none of them."""
+        for key in ("textures", "images", "samplers"):
+            if getattr(self, key):
+                document[key] = getattr(self, key)
+        if self.entries:
+            document["materials"] = self.entries
+        if self.extensions:
+            document["extensionsUsed"] = sorted(self.extensions)
+        needed = [name for name in sorted(self.extensions) if name.startswith("EXT_texture_")]
+        if needed:  # a picture of another format has nothing to fall back on
+            document["extensionsRequired"] = needed
+
+    def _own(self, material: Material, source: SourceMaterial) -> dict[str, Any]:
+        """A material of the input; textures of other coordinates than the first, which are not kept, go."""
+        entry: dict[str, Any] = deepcopy(dict(source.entry))
+        for holder, key in list(texture_places(entry)):
+            if holder[key].get("texCoord", 0) != 0:
+                del holder[key]
+                continue
+            holder[key]["index"] = self._texture(source.textures[holder[key]["index"]])
+        self.extensions.update(_extensions_of(entry))
+        return {**entry, "name": material.name, "doubleSided": material.double_sided}
+
+    def _texture(self, texture: Texture) -> int:
+        if texture.image not in self._pictures:
+            self._pictures.append(texture.image)
+            view = self.buffer.add_bytes(texture.image)
+            named = {"name": texture.name} if texture.name else {}
+            self.images.append({"bufferView": view, "mimeType": texture.mime, **named})
+        number = self._pictures.index(texture.image)
+        if texture.mime in ("image/png", "image/jpeg"):
+            entry: dict[str, Any] = {"source": number}
+        else:
+            name = f"EXT_texture_{texture.mime.rpartition('/')[2]}"
+            self.extensions.add(name)
+            entry = {"extensions": {name: {"source": number}}}
+        if texture.sampler:
+            sampler = dict(texture.sampler)
+            if sampler not in self.samplers:
+                self.samplers.append(sampler)
+            entry["sampler"] = self.samplers.index(sampler)
+        if entry not in self.textures:
+            self.textures.append(entry)
+        return self.textures.index(entry)
+
+
+def _extensions_of(part: Any) -> Iterator[str]:
+    """The extensions that an entry uses."""
+    if isinstance(part, dict):
+        yield from part.get("extensions", {})
+        for key, value in part.items():
+            if key != "extras":
+                yield from _extensions_of(value)
 
 
 def material_entry(material: Material) -> dict[str, Any]:

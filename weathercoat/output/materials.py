@@ -213,10 +213,15 @@ def film_materials(surface: Surface, look: str) -> Indices:
     that has a base colour texture.
     """
     material = face_materials(surface)
-    if look == "model":
-        return material
-    shows = [
-        look == "auto" and surface.uv is not None and source.base_texture is not None
-        for source in surface.materials
-    ]
+    shows = [shows_material(surface, number, look) for number in range(len(surface.materials))]
     return np.where(np.array([*shows, False])[material], material, np.int32(-1))
+
+
+def shows_material(surface: Surface, number: int, look: str) -> bool:
+    """Whether a film shows the material of this number, by a `look` as for `film_materials`."""
+    if number < 0 or number >= len(surface.materials) or look == "paint":
+        return False
+    source = surface.materials[number]
+    if look == "model":
+        return bool(source.entry)
+    return surface.uv is not None and source.base_texture is not None

@@ -25,13 +25,16 @@ def make_sheet(
     colors: Vectors | None = None,
     uv: Vectors | None = None,
     scalars: Mapping[str, NDArray[Any]] | None = None,
+    normals: Vectors | None = None,
+    role: str = "",
+    part: int = -1,
 ) -> Sheet:
     """A sheet with its normals: smooth, but split where faces meet by more than `crease` [rad].
 
     colors (n, 3), linear, and scalars (n,) belong to vertices; uv (m, 3, 2) to corners, and splits vertices
-    at its seams.
+    at its seams; so do normals (m, 3, 3), where they are given.
     """
-    values = corner_normals(vertices, faces, crease).astype(np.float64)
+    values = corner_normals(vertices, faces, crease).astype(np.float64) if normals is None else normals
     if uv is not None:
         values = np.concatenate([values, uv], axis=2)
     faces, source, values = split_corners(faces, values, len(vertices))
@@ -43,6 +46,8 @@ def make_sheet(
         colors=None if colors is None else colors[source],
         uv=None if uv is None else values[:, 3:],
         scalars={name: scalar[source] for name, scalar in (scalars or {}).items()},
+        role=role,
+        part=part,
     )
 
 

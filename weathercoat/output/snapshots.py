@@ -27,10 +27,13 @@ from weathercoat.mesh.surface import (
     vertex_normals,
 )
 from weathercoat.output.glb import Material, Node, Sheet, write_glb
+from weathercoat.output.materials import shows_material
+from weathercoat.output.parts import part_sheets, write_parts_glb
 from weathercoat.output.ply import PlyArrays, color_bytes, read_ply_arrays, write_ply
 from weathercoat.output.sheets import METAL_CREASE, make_sheet, srgb_to_linear, surface_nodes
-from weathercoat.output.shell import make_shell
+from weathercoat.output.shell import corner_normals, make_shell, open_edges
 from weathercoat.sim.snapshot import Snapshot
+from weathercoat.stain.color import Palette, stain_color
 
 # Depth of the metal under the film, in sizes (square root of the area): some twenty steps of a 24-bit depth
 # buffer whose near plane is a hundredth of the object away, and a third of an edge at a million faces.
@@ -45,6 +48,15 @@ _MOST_NAMES = 1 << 18  # characters of the names of groups and objects in a head
 PAINT = Material("paint", metallic=0.0, roughness=0.5, double_sided=True)
 PRIMER = Material("primer", metallic=0.0, roughness=0.8, double_sided=True)
 METAL = Material("metal", metallic=0.2, roughness=0.8, double_sided=True)
+
+
+class Look(NamedTuple):
+    """Where the film shows materials of the model, see `materials.film_materials`, and the colour of the rust
+    (sRGB, 0 to 1) that tints them.
+    """
+
+    kind: str
+    rust: tuple[float, float, float]
 
 
 def write_snapshot_ply(folder: Path | str, snapshot: Snapshot, stem: str) -> Path:
@@ -129,28 +141,36 @@ def write_snapshot_glb(
     *,
     thickness: float = 0.0,
     back_color: tuple[float, float, float] | None = None,
+    look: Look | None = None,
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     untouched: Surface | None = None,
 ) -> None:
-    """Write a snapshot as GLB: the nodes `film`, `substrate`, and one for each group of `untouched`.
+    """Write a snapshot as GLB.
+
+    Where the model has named parts, the nodes are those of the model, with their names and transforms, each
+    with a mesh of the film and the metal of its faces; else there are the nodes `film` and `substrate`, and
+    one for each group of `untouched`. The `extras` of each primitive tell its role: film, back, rim,
+    substrate or untouched, and the number of its part.
 
     With a thickness [units of the model] the film is a shell on the metal whose back and rim have
     `back_color` (sRGB, 0 to 1; None: that of the front), else a double-sided sheet. The metal lies a hair
-    beneath it. Colours are linear; the scalars are the attributes _RUST, _DIRT, _SEPARATED, _ADHESION,
+    beneath it. `look` tells where the film shows materials of the model. Colours are linear, and tint what
+    the model's own material shows; the scalars are the attributes _RUST, _DIRT, _SEPARATED, _ADHESION,
     _SEPARATION_AGE of the film and _RUST, _DIRT, _BARE of the metal. `up` is the model's axis against
     gravity. Raises OSError where the file cannot be written.
     """
-    others = [] if untouched is None else surface_nodes(untouched)
-    write_glb(
-        path,
-        [
-            Node("film", film_sheets(snapshot, thickness, back_color)),
-            Node("substrate", [metal_sheet(snapshot)]),
-            *others,
-        ],
-        up=up,
-        extras={"step": int(snapshot.step), "age": float(snapshot.age)},
-    )
+    sheets = [*film_sheets(snapshot, thickness, back_color, look), *metal_sheets(snapshot)]
+    extras = {"step": int(snapshot.step), "age": float(snapshot.age)}
+    surface = snapshot.surface
+    if surface is not None and surface.parts:
+        others = [] if untouched is None else part_sheets(untouched)
+        write_parts_glb(path, surface, [*sheets, *others], up=up, extras=extras)
+        return
+    nodes = [
+        Node("film", [sheet for sheet in sheets if sheet.role != "substrate"]),
+        Node("substrate", [sheet for sheet in sheets if sheet.role == "substrate"]),
+    ]
+    write_glb(path, nodes + ([] if untouched is None else surface_nodes(untouched)), up=up, extras=extras)
 
 
 def hair(snapshot: Snapshot) -> float:
@@ -163,23 +183,41 @@ def set_in(snapshot: Snapshot, depth: float) -> Vectors:
     return snapshot.substrate_vertices - depth * snapshot.substrate_normals
 
 
-def metal_sheet(snapshot: Snapshot) -> Sheet:
-    """The metal, a hair under the film, with its colours and scalars."""
-    return make_sheet(
-        METAL,
-        set_in(snapshot, hair(snapshot)),
-        snapshot.substrate_faces,
-        crease=METAL_CREASE,
-        colors=srgb_to_linear(snapshot.substrate_color),
-        scalars={"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
-    )
+def metal_sheets(snapshot: Snapshot) -> list[Sheet]:
+    """The metal, a hair under the film, with its colours and scalars; a sheet for each part of the model."""
+    vertices = set_in(snapshot, hair(snapshot))
+    faces, surface = snapshot.substrate_faces, snapshot.surface
+    normals = None if surface is None else surface.normals
+    if normals is None:
+        normals = corner_normals(vertices, faces, METAL_CREASE).astype(np.float64)
+    return [
+        _used_sheet(
+            METAL,
+            vertices,
+            faces,
+            chosen,
+            srgb_to_linear(snapshot.substrate_color),
+            {"_RUST": snapshot.substrate_rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare},
+            normals=normals,
+            uv=None if surface is None else surface.uv,
+            role="substrate",
+            part=part,
+        )
+        for part, chosen in _by_part(surface, np.arange(len(faces), dtype=np.int32))
+    ]
 
 
 def film_sheets(
-    snapshot: Snapshot, thickness: float, back_color: tuple[float, float, float] | None
+    snapshot: Snapshot,
+    thickness: float,
+    back_color: tuple[float, float, float] | None,
+    look: Look | None = None,
 ) -> list[Sheet]:
-    """The film's front, and where it has a thickness its back and rim; see `write_snapshot_glb`."""
-    colors = srgb_to_linear(snapshot.film_color)
+    """The film's front, and where it has a thickness its back and rim; a sheet of each for each part of the
+    model. See `write_snapshot_glb`.
+    """
+    faces, surface, film_face = snapshot.film_faces, snapshot.surface, snapshot.film_face
+    uv = None if surface is None or surface.uv is None else surface.uv[film_face]
     scalars = {
         "_RUST": snapshot.film_rust,
         "_DIRT": snapshot.dust[snapshot.film_origin],
@@ -187,26 +225,97 @@ def film_sheets(
         "_ADHESION": snapshot.adhesion,
         "_SEPARATION_AGE": snapshot.separation_age,
     }
-    if thickness <= 0.0:
-        return [_used_sheet(PAINT, snapshot.film_vertices, snapshot.film_faces, colors, scalars)]
-    shell = make_shell(snapshot.film_vertices, snapshot.film_faces, thickness, bevel=BEVEL * thickness)
-    under = colors if back_color is None else np.broadcast_to(srgb_to_linear(back_color), colors.shape)
-    doubled = {name: np.tile(values, 2) for name, values in scalars.items()}
-    return [
-        _used_sheet(material, shell.vertices, faces, np.tile(shade, (2, 1)), doubled)
-        for material, faces, shade in (
-            (PAINT, shell.front, colors),
-            (PRIMER, shell.back, under),
-            (PRIMER, shell.rim, under),
+    is_shell = thickness > 0.0
+    if is_shell:
+        shell = make_shell(snapshot.film_vertices, faces, thickness, bevel=BEVEL * thickness)
+        vertices, owners = shell.vertices, np.repeat(open_edges(faces)[2], 2)
+        under = srgb_to_linear(snapshot.film_color if back_color is None else back_color)
+        under = np.tile(np.broadcast_to(under, (len(snapshot.film_vertices), 3)), (2, 1))
+        scalars = {name: np.tile(values, 2) for name, values in scalars.items()}
+    else:
+        vertices = snapshot.film_vertices
+    copies = 2 if is_shell else 1
+    normals = _front_normals(snapshot, vertices)
+    sheets = []
+    for part, chosen in _by_part(surface, film_face):
+        material, colors = _front_look(snapshot, part, look)
+        sheets.append(
+            _used_sheet(
+                material,
+                vertices,
+                faces,
+                chosen,
+                np.tile(srgb_to_linear(colors), (copies, 1)),
+                scalars,
+                normals=normals,
+                uv=uv,
+                role="film",
+                part=part,
+            )
         )
+        if is_shell:
+            rim = np.flatnonzero(np.isin(owners, chosen))
+            for role, triangles, rows in (("back", shell.back, chosen), ("rim", shell.rim, rim)):
+                sheets.append(
+                    _used_sheet(PRIMER, vertices, triangles, rows, under, scalars, role=role, part=part)
+                )
+    return sheets
+
+
+def _by_part(surface: Surface | None, faces: Indices) -> list[tuple[int, NDArray[np.intp]]]:
+    """The parts of the model, and which of these faces of the metal are theirs; all are of part -1 where the
+    model has none.
+    """
+    if surface is None or surface.face_part is None or not surface.parts:
+        return [(-1, np.arange(len(faces)))]
+    part = surface.face_part[faces]
+    order = np.argsort(part, kind="stable")
+    bounds = np.searchsorted(part[order], np.arange(len(surface.parts) + 1))
+    return [
+        (n, order[bounds[n] : bounds[n + 1]]) for n in range(len(surface.parts)) if bounds[n] < bounds[n + 1]
     ]
 
 
+def _front_look(snapshot: Snapshot, part: int, look: Look | None) -> tuple[Material, Vectors]:
+    """The material of the front of a part, and the colours (sRGB, 0 to 1) of the film's vertices on it."""
+    surface = snapshot.surface
+    if surface is None or part < 0 or look is None:
+        return PAINT, snapshot.film_color
+    number = surface.parts[part].material
+    if not shows_material(surface, number, look.kind):
+        return PAINT, snapshot.film_color
+    source = surface.materials[number]
+    origin = snapshot.film_origin
+    own = np.ones((len(origin), 3)) if surface.colors is None else surface.colors[origin, :3]
+    tint = stain_color(own, Palette(rust=look.rust), snapshot.film_rust, snapshot.dust[origin])
+    return Material(source.name, 0.0, 0.5, double_sided=True, source=source), tint
+
+
+def _front_normals(snapshot: Snapshot, vertices: Vectors) -> Vectors:
+    """Shading normals (m, 3, 3) of the film's front: those of the model where it is attached."""
+    faces, surface = snapshot.film_faces, snapshot.surface
+    normals = corner_normals(vertices, faces, FILM_CREASE).astype(np.float64)
+    if surface is not None and surface.normals is not None:
+        attached = ~snapshot.separated[faces].any(axis=1)
+        normals[attached] = surface.normals[snapshot.film_face[attached]]
+    return normals
+
+
 def _used_sheet(
-    material: Material, vertices: Vectors, faces: Indices, colors: Vectors, scalars: dict[str, NDArray[Any]]
+    material: Material,
+    vertices: Vectors,
+    faces: Indices,
+    chosen: NDArray[np.integer],
+    colors: Vectors,
+    scalars: dict[str, NDArray[Any]],
+    *,
+    normals: Vectors | None = None,
+    uv: Vectors | None = None,
+    role: str,
+    part: int,
 ) -> Sheet:
-    """A sheet of the vertices that its faces use."""
-    used, renumbered = np.unique(faces, return_inverse=True)
+    """A sheet of the chosen faces (k,), with the vertices that they use."""
+    used, renumbered = np.unique(faces[chosen], return_inverse=True)
     return make_sheet(
         material,
         vertices[used],
@@ -214,6 +323,10 @@ def _used_sheet(
         crease=FILM_CREASE,
         colors=colors[used],
         scalars={name: values[used] for name, values in scalars.items()},
+        normals=None if normals is None else normals[chosen],
+        uv=None if uv is None else uv[chosen],
+        role=role,
+        part=part,
     )
 
 

@@ -23,7 +23,7 @@ from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.folder import whole_file
 from weathercoat.output.glb import GlbBuffer, Material, Sheet, material_entry, rotation_to_y, write_document
 from weathercoat.output.sheets import surface_nodes
-from weathercoat.output.snapshots import film_sheets, metal_sheet
+from weathercoat.output.snapshots import film_sheets, metal_sheets
 from weathercoat.scene.camera_node import add_camera
 from weathercoat.scene.graph import AgedMesh, Scene, SceneObject, place
 from weathercoat.scene.read_glb import instance_matrices
@@ -189,7 +189,7 @@ class _Writer:
             film = self.films[key]
             sheets = [
                 *film_sheets(film.snapshot, film.thickness, film.back_color),
-                metal_sheet(film.snapshot),
+                *metal_sheets(film.snapshot),
             ]
             numbers = [self._material(sheet.material) for sheet in sheets]
             for sheet in _sheets(film.untouched):

@@ -18,9 +18,11 @@ class Palette:
     rust: tuple[float, float, float] = (132 / 255, 51 / 255, 0.0)
 
 
-def stain_color(base: tuple[float, float, float], palette: Palette, rust: Vectors, dust: Vectors) -> Vectors:
-    """Colour of a surface with rust and dust (n,): towards rust by 1 - exp(-(rust - 0.1)), times exp(-dust),
-    (n, 3).
+def stain_color(
+    base: tuple[float, float, float] | Vectors, palette: Palette, rust: Vectors, dust: Vectors
+) -> Vectors:
+    """Colour of a surface of one base colour, or one for each (n, 3), with rust and dust (n,): towards rust
+    by 1 - exp(-(rust - 0.1)), times exp(-dust); (n, 3).
     """
     share = -np.expm1(-np.maximum(rust - 0.1, 0.0))[:, None]
     mixed = (1.0 - share) * np.asarray(base) + share * np.asarray(palette.rust)

@@ -23,28 +23,45 @@ _ATTRIBUTE_TYPES = {"POSITION": "VEC3", "NORMAL": "VEC3", "COLOR_0": "VEC3", "TE
 @dataclass(frozen=True)
 class Primitive:
     """Triangles of one material: attributes by their names, float32 (n,), (n, 2) or (n, 3); indices uint32
-    (m, 3); bounds float64 (2, 3), what the accessor of the positions says is their minimum and maximum.
+    (m, 3); bounds float64 (2, 3), what the accessor of the positions says is their minimum and maximum. role:
+    what of a snapshot it is; part: the number of the model's part, or -1; matrix float64 (4, 4): from its
+    node to the scene.
     """
 
     material: str
     attributes: dict[str, NDArray[np.float32]]
     indices: NDArray[np.uint32]
     bounds: NDArray[np.float64]
+    role: str
+    part: int
+    matrix: NDArray[np.float64]
+
+    def placed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The positions (n, 3) in the scene, and how far the rounding of those stored can move each."""
+        stored = self.attributes["POSITION"].astype(np.float64)
+        linear = self.matrix[:3, :3]
+        return (
+            np.einsum("ij,nj->ni", linear, stored) + self.matrix[:3, 3],
+            np.einsum("ij,nj->ni", np.abs(linear), np.abs(stored)),
+        )
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether the scene shows its faces the other way round."""
+        return bool(np.linalg.det(self.matrix[:3, :3]) < 0.0)
 
 
 @dataclass(frozen=True)
 class Glb:
-    """step and age of `asset.extras`; translation (3,) of the node `model`; nodes below it by name, each
-    with its primitives."""
+    """step and age of `asset.extras`; primitives, those of the scene in the order of its nodes."""
 
     step: int
     age: float
-    translation: NDArray[np.float64]
-    nodes: tuple[tuple[str, tuple[Primitive, ...]], ...]
+    primitives: tuple[Primitive, ...]
 
-    def primitives(self, name: str) -> tuple[Primitive, ...]:
-        """The primitives of the first node of a name; none where it has no mesh."""
-        return next((primitives for node, primitives in self.nodes if node == name), ())
+    def of_role(self, role: str) -> tuple[Primitive, ...]:
+        """The primitives of a role: film, back, rim, substrate, or another."""
+        return tuple(primitive for primitive in self.primitives if primitive.role == role)
 
 
 def read_glb(content: bytes) -> Glb:
@@ -55,26 +72,59 @@ def read_glb(content: bytes) -> Glb:
         raise BrokenFileError("is no glTF 2.0")
     if take(document, "buffers.0.byteLength", int, 0) != len(binary):
         raise BrokenFileError(f"its buffer is not the {len(binary):,} bytes of the binary chunk")
-    root = take(document, f"scenes.{take(document, 'scene', int)}.nodes.0", int)
-    model = take(document, f"nodes.{root}", dict)
-    translation = take(model, "translation", list)
-    if len(translation) != 3 or not all(map(is_number, translation)):
-        raise BrokenFileError("the node model is moved by no three numbers")
-    nodes = []
-    for number in take(model, "children", list):
-        node = take({"nodes": take(document, "nodes", list)}, f"nodes.{number}", dict)
-        name = take(node, "name", str)
-        primitives: list[Primitive] = []
+    primitives: list[Primitive] = []
+    for node, matrix in _placed_nodes(document):
         if "mesh" in node:
             mesh = take(document, f"meshes.{take(node, 'mesh', int)}", dict)
-            primitives += [_primitive(document, binary, entry) for entry in take(mesh, "primitives", list)]
-        nodes.append((name, tuple(primitives)))
+            primitives += [
+                _primitive(document, binary, entry, matrix) for entry in take(mesh, "primitives", list)
+            ]
     return Glb(
         step=take(document, "asset.extras.step", int),
         age=take(document, "asset.extras.age", float),
-        translation=np.array(translation, np.float64),
-        nodes=tuple(nodes),
+        primitives=tuple(primitives),
     )
+
+
+def _placed_nodes(document: dict[str, Any]) -> list[tuple[dict[str, Any], NDArray[np.float64]]]:
+    """The nodes of the scene with their matrices to it, parents before children."""
+    count = len(take(document, "nodes", list))
+    tops = take(document, f"scenes.{take(document, 'scene', int)}.nodes", list)
+    waiting = [(number, np.eye(4)) for number in reversed(tops)]
+    placed: list[tuple[dict[str, Any], NDArray[np.float64]]] = []
+    while waiting:
+        number, outer = waiting.pop()
+        if not isinstance(number, int) or not 0 <= number < count or len(placed) == count:
+            raise BrokenFileError("its nodes are no tree")
+        node = take(document, f"nodes.{number}", dict)
+        matrix = outer @ _matrix(node)
+        placed.append((node, matrix))
+        waiting += [(child, matrix) for child in reversed(take(node, "children", list, []))]
+    return placed
+
+
+def _matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    """The matrix of a node: its own, or of its translation, rotation and scale."""
+    if "matrix" in node:
+        return _numbers(node["matrix"], 16).reshape(4, 4).T
+    x, y, z, w = _numbers(node.get("rotation", [0, 0, 0, 1]), 4)
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn * _numbers(node.get("scale", [1, 1, 1]), 3)
+    matrix[:3, 3] = _numbers(node.get("translation", [0, 0, 0]), 3)
+    return matrix
+
+
+def _numbers(values: object, count: int) -> NDArray[np.float64]:
+    if not isinstance(values, list) or len(values) != count or not all(map(is_number, values)):
+        raise BrokenFileError(f"a node is moved by no {count} numbers")
+    return np.array(values, np.float64)
 
 
 def _chunks(content: bytes) -> tuple[bytes, memoryview]:
@@ -97,7 +147,9 @@ def _chunks(content: bytes) -> tuple[bytes, memoryview]:
     return content[20:start], memoryview(content)[start + 8 :]
 
 
-def _primitive(document: dict[str, Any], binary: memoryview, entry: object) -> Primitive:
+def _primitive(
+    document: dict[str, Any], binary: memoryview, entry: object, matrix: NDArray[np.float64]
+) -> Primitive:
     attributes = {}
     numbers = take(entry, "attributes", dict)
     for name in numbers:
@@ -113,7 +165,15 @@ def _primitive(document: dict[str, Any], binary: memoryview, entry: object) -> P
     if any(len(bound) != 3 or not all(map(is_number, bound)) for bound in bounds):
         raise BrokenFileError("an accessor of positions has no bounds")
     material = take(document, f"materials.{take(entry, 'material', int)}.name", str)
-    return Primitive(material, attributes, indices.reshape(-1, 3), np.array(bounds, np.float64))
+    return Primitive(
+        material,
+        attributes,
+        indices.reshape(-1, 3),
+        np.array(bounds, np.float64),
+        role=take(entry, "extras.role", str, ""),
+        part=take(entry, "extras.part", int, -1),
+        matrix=matrix,
+    )
 
 
 def _array(document: dict[str, Any], binary: memoryview, number: int, kind: str, shape: str) -> NDArray[Any]:

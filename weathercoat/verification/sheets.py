@@ -15,11 +15,9 @@ from weathercoat.verification.metal import Metal
 from weathercoat.verification.ply import PlySnapshot
 from weathercoat.verification.precision import DOUBLE, REPORTED, ROUNDINGS, SINGLE
 
-_PARTS = ("film", "substrate")
-_SCALARS = {
-    "film": {"_RUST", "_DIRT", "_SEPARATED", "_ADHESION", "_SEPARATION_AGE"},
-    "substrate": {"_RUST", "_DIRT", "_BARE"},
-}
+_OF_FILM = {"_RUST", "_DIRT", "_SEPARATED", "_ADHESION", "_SEPARATION_AGE"}
+_SCALARS = {"film": _OF_FILM, "back": _OF_FILM, "rim": _OF_FILM, "substrate": {"_RUST", "_DIRT", "_BARE"}}
+_MATERIALS = {"back": "primer", "rim": "primer", "substrate": "metal"}
 _HIGHEST = {"_RUST": 1.0, "_DIRT": 1.0, "_SEPARATED": 1.0, "_BARE": 1.0, "_ADHESION": np.inf}
 
 
@@ -36,48 +34,32 @@ def check_glb(
     """Whether a GLB is sound and has as many faces as told: of the film, of the metal, and of unpainted
     parts. `is_shell`: whether the film has a thickness. Returns whether it can be compared with the PLY.
     """
-    names = tuple(name for name, _ in glb.nodes[:2])
-    if not ledger.expect("glb-nodes", file, names == _PARTS, f"its first nodes are {names}, not {_PARTS}"):
-        return False
     sound = True
-    for place, (name, primitives) in enumerate(glb.nodes):
-        for primitive in primitives:
-            where = f"{name}, {primitive.material}"
-            sound &= _check_primitive(ledger, file, where, primitive, glb.age)
-            if place < 2:
-                scalars = {key for key in primitive.attributes if key.startswith("_")}
-                sound &= ledger.expect(
-                    "glb-attributes",
-                    file,
-                    scalars == _SCALARS[name] and "COLOR_0" in primitive.attributes,
-                    f"{where} has the attributes {', '.join(sorted(primitive.attributes))}",
-                )
-    film, metal = glb.nodes[0][1], glb.nodes[1][1]
-    materials = [primitive.material for primitive in film]
-    # A shell has a front, a back, and a rim where there are open edges.
-    wanted = [["paint", "primer", "primer"], ["paint", "primer"]] if is_shell else [["paint"]]
-    sound &= ledger.expect(
-        "glb-materials",
-        file,
-        materials in wanted if film_faces else not materials,
-        f"the film is made of {materials}, not of {wanted[0]}",
-    )
-    sound &= ledger.expect(
-        "glb-materials",
-        file,
-        [part.material for part in metal] == ["metal"],
-        "the substrate is not of one metal",
-    )
-    counts = [("film", film[:2], film_faces), ("substrate", metal, metal_faces)]
-    for name, primitives, told in counts:
-        for primitive in primitives:
+    for primitive in glb.primitives:
+        where = f"{primitive.role or 'unpainted'}, {primitive.material}"
+        sound &= _check_primitive(ledger, file, where, primitive, glb.age)
+        if primitive.role in _SCALARS:
+            scalars = {key for key in primitive.attributes if key.startswith("_")}
             sound &= ledger.expect(
-                "glb-counts",
+                "glb-attributes",
                 file,
-                len(primitive.indices) == told,
-                f"{name}, {primitive.material}, has {len(primitive.indices):,} faces instead of {told:,}",
+                scalars == _SCALARS[primitive.role] and "COLOR_0" in primitive.attributes,
+                f"{where} has the attributes {', '.join(sorted(primitive.attributes))}",
             )
-    others = sum(len(part.indices) for _, parts in glb.nodes[2:] for part in parts)
+        if primitive.role in _MATERIALS:
+            sound &= ledger.expect(
+                "glb-materials",
+                file,
+                primitive.material == _MATERIALS[primitive.role],
+                f"{where} is not made of {_MATERIALS[primitive.role]}",
+            )
+    backs = film_faces if is_shell else 0
+    for role, told in (("film", film_faces), ("back", backs), ("substrate", metal_faces)):
+        count = sum(len(primitive.indices) for primitive in glb.of_role(role))
+        sound &= ledger.expect(
+            "glb-counts", file, count == told, f"the {role} has {count:,} faces instead of {told:,}"
+        )
+    others = sum(len(p.indices) for p in glb.primitives if p.role not in _SCALARS)
     ledger.expect(
         "glb-counts",
         file,
@@ -111,33 +93,49 @@ def check_agreement(
     )
     turn = rotation_to_y(up)
     count = len(metal.vertices)
-    turned = np.einsum("ij,nj->ni", turn, snapshot.positions) - glb.translation
-    extent = float(np.abs(snapshot.positions).max()) + float(np.abs(glb.translation).max())
+    turned = np.einsum("ij,nj->ni", turn, snapshot.positions)
+    offsets = [float(np.abs(primitive.matrix[:3, 3]).max()) for primitive in glb.primitives]
+    extent = float(np.abs(snapshot.positions).max()) + max(offsets, default=0.0)
     is_exact = all(part == round(part) for part in up)
     slack = extent * (ROUNDINGS * DOUBLE + (0.0 if is_exact else 4 * REPORTED))
     every = np.arange(count)
-    rows: dict[str, NDArray[Any]] = {"_RUST": snapshot.rust, "_DIRT": snapshot.dust, "_BARE": snapshot.bare}
-    (part,) = glb.nodes[1][1]
-    _compare(ledger, file, "metal", part, metal.faces, every, turned, slack, rows, snapshot.colors)
-
-    rows = {
+    of_film = np.arange(count, len(snapshot.part))
+    rows: dict[str, NDArray[Any]] = {
         "_RUST": snapshot.rust,
         "_DIRT": snapshot.dust,
+        "_BARE": snapshot.bare,
         "_SEPARATED": snapshot.separated,
         "_ADHESION": snapshot.adhesion,
         "_SEPARATION_AGE": snapshot.separation_age,
     }
-    of_film = np.arange(count, len(snapshot.part))
-    sheets = glb.nodes[0][1]
-    if sheets:
-        lift = 2.0 * thickness if len(sheets) > 1 else 0.0
+    part = snapshot.face_more.get("object")
+    lift = 2.0 * thickness if glb.of_role("back") else 0.0
+    first = len(metal.faces)
+    for primitive in glb.primitives:
+        if primitive.role not in ("film", "back", "substrate"):
+            continue
+        of_metal = primitive.role == "substrate"
+        faces = metal.faces if of_metal else film.faces
+        if part is not None:
+            faces = faces[(part[:first] if of_metal else part[first:]) == primitive.part]
+        if primitive.role == "back":
+            faces = faces[:, ::-1]
+        is_own = primitive.role == "back" or primitive.material not in ("paint", "metal")
         _compare(
-            ledger, file, "paint", sheets[0], film.faces, of_film, turned, slack + lift, rows, snapshot.colors
+            ledger,
+            file,
+            f"{primitive.role} of {primitive.material}",
+            primitive,
+            faces,
+            every if of_metal else of_film,
+            turned,
+            slack + (lift if primitive.role == "film" else 0.0),
+            {name: rows[name] for name in _SCALARS[primitive.role]},
+            None if is_own else snapshot.colors,
         )
-    if len(sheets) > 1:
-        rim = len(sheets[2].indices) if len(sheets) > 2 else 0
+    if glb.of_role("back"):
+        rim = sum(len(primitive.indices) for primitive in glb.of_role("rim"))
         open_edges = film.faces.size - int(np.count_nonzero(film.is_joined))
-        _compare(ledger, file, "primer", sheets[1], film.faces[:, ::-1], of_film, turned, slack, rows, None)
         ledger.expect(
             "formats-agree",
             file,
@@ -234,7 +232,7 @@ def _compare(
         f"{what}: there are {len(primitive.indices):,} faces, but {len(faces):,} in the PLY",
     ):
         return
-    indices = primitive.indices.ravel()
+    indices = (primitive.indices[:, [0, 2, 1]] if primitive.is_mirrored else primitive.indices).ravel()
     corners = numbers[faces.ravel()]
     count = len(primitive.attributes["POSITION"])
     source = np.zeros(count, np.int64)
@@ -248,8 +246,8 @@ def _compare(
         lambda i: f"{what}: face {i} has a vertex that stands for two of the PLY",
     ):
         return
-    stored = primitive.attributes["POSITION"].astype(np.float64)
-    off = np.abs(stored - turned[source]) - SINGLE * np.abs(stored)
+    shown, rounded = primitive.placed()
+    off = np.abs(shown - turned[source]) - 2 * SINGLE * rounded
     ledger.expect_all(
         "formats-agree",
         file,

@@ -37,6 +37,8 @@ from weathercoat.mesh.surface import Part
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 # Extensions that put the geometry of a primitive elsewhere.
 _ELSEWHERE = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+# What stays of a node: its name, its place, what hangs below it, and what programs keep there.
+_OF_NODES = ("name", "children", "matrix", "translation", "rotation", "scale", "extras")
 _SEMANTIC = re.compile(r"POSITION|NORMAL|TANGENT|(TEXCOORD|COLOR|JOINTS|WEIGHTS)_[0-9]+|_.*", re.DOTALL)
 
 
@@ -64,6 +66,9 @@ def read_gltf(data: bytes, folder: Path | None) -> Polygons:
         document = GltfDocument(data, folder)
         placed = [node for node in document.placed_nodes() if "mesh" in node.entry]
         result = gather_polygons(document, placed)
+        result.tree = tuple(
+            {key: node[key] for key in _OF_NODES if key in node} for node in document.json.get("nodes", [])
+        )
         result.notes += _lost(document) if len(result.sizes) else []
     return result
 

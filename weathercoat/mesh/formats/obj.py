@@ -45,6 +45,8 @@ def read_obj(data: bytes, folder: Path | None) -> Polygons:
     indices, sizes, notes = _faces(lines, f, v, vt, vn)
     face_group, groups = _groups(lines, f)
     materials, missing = _materials(lines, folder)
+    for name in _switches(lines, "usemtl")[1]:  # one that no library has keeps its name
+        materials.setdefault(name, SourceMaterial(name))
     face_part, parts = _parts(lines, f, list(materials))
     polygons = Polygons(
         positions=positions,
@@ -219,7 +221,10 @@ def _parts(
     rank = np.empty(len(order), np.int32)
     rank[order] = np.arange(len(order), dtype=np.int32)
     names, shown_names = ["", *names], ["", *shown_names]
-    parts = [Part(names[i] or "default", numbers.get(shown_names[j], -1)) for i, j in used[order].tolist()]
+    parts = [
+        Part(names[i] or shown_names[j] or "default", numbers.get(shown_names[j], -1))
+        for i, j in used[order].tolist()
+    ]
     number: dict[Part, int] = {}
     place = np.array([number.setdefault(part, len(number)) for part in parts], np.int32)
     return place[rank[face_part.reshape(-1)]], tuple(number)

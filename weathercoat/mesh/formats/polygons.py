@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,7 @@ class Polygons:
     face_group: int32 (m,), an index into `groups`.
     colors: float64 (n, 4), RGBA from 0 to 1, sRGB-encoded, or None.
     normals: float64 (k, 3), a unit shading normal per corner, zero where it has none, or None.
-    face_part: int32 (m,), an index into `parts`, or None; materials: those of the parts.
+    face_part: int32 (m,), an index into `parts`, or None; materials and tree: see `Surface`.
     part: int64 (n,), vertices of different parts (instances, nodes) are never welded; or None.
     single_precision: positions are stored as float32, so that equal points may differ by its rounding.
     shared: faces of this format share their vertices by index, so that a repeated position is worth a note.
@@ -39,6 +41,7 @@ class Polygons:
     face_part: NDArray[np.int32] | None = None
     parts: tuple[Part, ...] = ()
     materials: tuple[SourceMaterial, ...] = ()
+    tree: tuple[Mapping[str, Any], ...] = ()
     part: NDArray[np.int64] | None = None
     single_precision: bool = False
     shared: bool = True
