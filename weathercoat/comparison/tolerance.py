@@ -127,13 +127,12 @@ def _number(key: str, item: Item, refuse: _Refuse, least: float = 0.0, most: flo
 def _omitted(item: Item | None, refuse: _Refuse) -> Iterator[str]:
     if item is None or item.value is None:
         return
-    patterns = item.value if isinstance(item.value, list) else [item.value]
-    for pattern in patterns:
+    for pattern, line in item.value if isinstance(item.value, list) else [item]:
         if isinstance(pattern, str):
-            _require_figure("omit", pattern, item.line, refuse)
+            _require_figure("omit", pattern, line, refuse)
             yield pattern
         else:
-            refuse(item.line, "omit", f"must be a list of names or patterns, not {shortened(pattern)}")
+            refuse(line, "omit", f"must be a list of names or patterns, not {shortened(pattern)}")
 
 
 def _rules(item: Item | None, refuse: _Refuse) -> Iterator[Rule]:
