@@ -12,7 +12,7 @@ ifneq ($(wildcard ../shared/meshes/index.tsv),)
 export WEATHERCOAT_MESHES ?= $(abspath ../shared/meshes)
 endif
 
-.PHONY: help demo test test-all test-plain test-bounds golden coverage fuzz lint docs bench charts venv dev clean
+.PHONY: help demo test test-all test-plain test-bounds golden coverage fuzz lint web docs bench charts venv dev clean
 
 help:
 	@echo "make demo      age a sign plate and say where to look"
@@ -21,6 +21,7 @@ help:
 	@echo "make coverage  run the core's tests without the JIT, and say what they reach"
 	@echo "make fuzz      damaged files and configs, runs at the bounds: for FUZZ_SECONDS=1200, from FUZZ_SEED (the date)"
 	@echo "make lint      style, types and import contracts"
+	@echo "make web       bundle the script of the viewer's pages anew, with Node"
 	@echo "make docs      run the commands of the documentation again and refresh its pictures"
 	@echo "make bench     time it, and put the figures into the documentation"
 	@echo "make charts    measure accuracy and stability, and put the charts into the documentation"
@@ -94,6 +95,14 @@ lint: dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The script that `weathercoat view` puts into its pages; npm needs a network the first time.
+web: web/node_modules
+	cd web && node build.mjs
+
+web/node_modules: web/package.json
+	cd web && npm install --no-package-lock --no-audit --no-fund
+	@touch $@
 
 docs: venv
 	$(BIN)/python docs/make.py

@@ -30,6 +30,7 @@ print("LOADED", code, *loaded)
         ["remesh", "--help"],
         ["inspect", "--help"],
         ["render", "--help"],
+        ["view", "--help"],
         ["bake", "--help"],
         ["verify", "--help"],
         ["compare", "--help"],

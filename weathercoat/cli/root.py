@@ -26,6 +26,7 @@ SUBCOMMANDS = (
     "render",
     "risk",
     "bake",
+    "view",
     "verify",
     "compare",
     "schema",
