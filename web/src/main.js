@@ -27,8 +27,8 @@ const element = (id) => document.getElementById(id);
 const about = JSON.parse(element("about").textContent);
 const snapshots = about.snapshots;
 
-/** What is shown; the part of the address after # sets it, and follows it. */
-const state = {
+/** What is shown where the part of the address after # says nothing else; that follows what is shown. */
+const DEFAULTS = {
   shown: snapshots.length - 1,
   before: 0,
   compare: false,
@@ -41,7 +41,9 @@ const state = {
   untouched: true,
   bare: false,
 };
-const view = { azimuth: 0, elevation: 0, zoom: 1 };
+const state = { ...DEFAULTS };
+const STRAIGHT = { azimuth: 0, elevation: 0, zoom: 1 };
+const view = { ...STRAIGHT };
 
 const indexOf = (step) => {
   const distances = snapshots.map((snapshot) => Math.abs(snapshot.step - step));
@@ -50,6 +52,8 @@ const indexOf = (step) => {
 
 function readAddress() {
   const asked = { ...about.start, ...Object.fromEntries(new URLSearchParams(location.hash.slice(1))) };
+  Object.assign(state, DEFAULTS);
+  Object.assign(view, STRAIGHT);
   if (asked.step !== undefined) state.shown = indexOf(Number(asked.step));
   if (asked.after !== undefined) state.shown = indexOf(Number(asked.after));
   if (asked.before !== undefined) state.before = indexOf(Number(asked.before));
@@ -75,7 +79,7 @@ function writeAddress() {
   for (const part of ["film", "metal", "untouched"]) if (!state[part]) asked.set(part, "0");
   if (state.bare) asked.set("ui", "0");
   for (const name of ["azimuth", "elevation", "zoom"]) {
-    if (view[name] !== (name === "zoom" ? 1 : 0)) asked.set(name, view[name]);
+    if (view[name] !== STRAIGHT[name]) asked.set(name, view[name]);
   }
   history.replaceState(null, "", `#${asked}`);
 }
@@ -218,7 +222,7 @@ function loop() {
   if (controls.update()) isDirty = true;
   if (!isDirty || !shown) return;
   isDirty = false;
-  ground.group.visible = camera.position.y > ground.group.position.y;
+  ground.group.visible = camera.position.y > ground.group.position.y && (state.film || state.metal);
   draw();
   document.documentElement.dataset.ready = "yes";
 }
@@ -266,6 +270,7 @@ function apply() {
   applyOverlay();
   lighting.use(state.light);
   ground.use(LIGHTS[state.light]);
+  uniforms.filmShown.value = state.film;
   uniforms.exposure.value = LIGHTS[state.light].exposure;
   for (const [id, value] of [["overlays", state.overlay], ["lights", state.light], ["backgrounds", state.background]]) {
     for (const button of element(id).children) {
@@ -293,6 +298,7 @@ function apply() {
   element("side-before").style.cssText = `left: auto; right: calc(${100 - 100 * state.divider}% + 26px)`;
   element("side-after").style.cssText = `left: calc(${100 * state.divider}% + 26px)`;
   showFigures(state.shown);
+  element("probe").hidden = true; // of another state
   invalidate(true);
 }
 
@@ -368,7 +374,7 @@ function makeControls() {
   element("play").onclick = () => play(!timer);
   element("compare").onclick = () => set({ compare: !state.compare });
   element("home").onclick = () => {
-    Object.assign(view, { azimuth: 0, elevation: 0, zoom: 1 });
+    Object.assign(view, STRAIGHT);
     frame();
   };
   element("picture").onclick = savePicture;

@@ -25,6 +25,7 @@ uniform vec3 paint;
 uniform vec3 fallLine;
 uniform vec4 stateShare, figureShare; // which scalar the overlay shows; all 0 for none
 uniform float overlay, exposure;
+uniform bool filmShown;
 uniform mat3 normalMatrix;
 varying vec3 vRest;
 varying vec4 vState;
@@ -156,6 +157,7 @@ export function makeMaterial(noiseMap, about) {
     figureShare: { value: new Vector4() },
     overlay: { value: 0 },
     exposure: { value: 1 },
+    filmShown: { value: true },
   };
   const material = new MeshStandardMaterial({ side: DoubleSide, vertexColors: false });
   material.onBeforeCompile = (shader) => {
@@ -187,7 +189,7 @@ export function makeMaterial(noiseMap, about) {
         .replace(
           "#include <aomap_fragment>",
           /* glsl */ `
-          float openness = vFigures.w;
+          float openness = vKind > 2.5 && !filmShown ? 1.0 : vFigures.w; // only film darkens metal
           reflectedLight.indirectDiffuse *= openness;
           reflectedLight.directDiffuse *= mix(1.0, openness, 0.35);
           reflectedLight.indirectSpecular *= openness * openness;`,
