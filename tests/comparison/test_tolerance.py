@@ -74,7 +74,7 @@ def test_the_largest_limit_counts() -> None:
         ("level: yes", 1, "level", "must be a number"),
         ("positions: -1", 1, "positions", "must be a number of at least 0, not -1"),
         ("pictures: .nan", 1, "pictures", "must be a number"),
-        ("omit:\n  - 3", 1, "omit", "must be a list of names"),
+        ("omit:\n  - 3", 2, "omit", "must be a list of names"),
         ("omit: [lost]", 1, "omit", "fits no figure; there are separated_share"),
         ("figures: [flakes]", 1, "figures", "must be a mapping"),
         ("figures:\n  flaks: {relative: 1}", 2, "figures.flaks", "did you mean flakes?"),
