@@ -198,6 +198,6 @@ def test_the_command_records_and_checks(tmp_path: Path, capsys: pytest.CaptureFi
     assert call(["baseline", "check", *given]) == 0
     assert call(["baseline", "check", *given, "--exact"]) == 1
     assert (
-        "sheet/seed-3: other bytes in snapshots/step_0015.ply, snapshots/step_0030.ply"
+        "sheet/seed-3: other bytes in severity.csv, snapshots/step_0015.ply, snapshots/step_0030.ply"
         in capsys.readouterr().out
     )
