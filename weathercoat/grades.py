@@ -98,7 +98,7 @@ def parse_limits(text: str) -> tuple[Limit, ...]:
     """The limits of a text such as `rust=Ri3`, `rust=D610:5`, `flaking=4` or `bare@hull=12%`; commas join
     those that have to be reached all.
 
-    Raises ValueError, which says what is wrong, and of which part.
+    Raises ValueError, which says what is wanted instead.
     """
     return tuple(_parse_limit(part.strip()) for part in text.split(","))
 
@@ -106,21 +106,19 @@ def parse_limits(text: str) -> tuple[Limit, ...]:
 def _parse_limit(text: str) -> Limit:
     found = _FORM.fullmatch(text)
     if found is None:
-        raise ValueError(f"{text!r} is no limit; give one such as rust=Ri3, flaking=4 or bare=12%")
+        raise ValueError("must be a limit such as rust=Ri3, flaking=4 or bare=12%")
     what, group, scale, grade, percent = found.groups()
     figure = "rusted" if what == "rust" else "flaked"
     if percent is not None:
         if not 0.0 < float(percent) <= 100.0:
-            raise ValueError(f"{text!r} is no limit; percent are above 0 and at most 100")
+            raise ValueError("must be above 0 and at most 100 percent")
         return Limit(figure, float(percent), False, group, text)
     value = int(grade)
-    if what == "bare" or (what == "rust") != (scale is not None):
-        how = {"rust": "Ri1 to Ri5, D610:9 to D610:0", "flaking": "1 to 5"}.get(what)
-        raise ValueError(f"{text!r} is no limit; {what} takes {f'{how} or ' if how else ''}percent")
-    if scale == "D610:":
-        if value > 9:
-            raise ValueError(f"{text!r} is no limit; D610 has 9 to 0 below whole paint")
+    if what == "rust" and scale == "D610:" and value <= 9:
         return Limit(figure, D610_MOST[value], True, group, text)
-    if not 1 <= value <= 5:
-        raise ValueError(f"{text!r} is no limit; classes above none are 1 to 5")
-    return Limit(figure, (RUST_FROM if what == "rust" else FLAKING_FROM)[value - 1], False, group, text)
+    if what == "rust" and scale == "Ri" and 1 <= value <= 5:
+        return Limit(figure, RUST_FROM[value - 1], False, group, text)
+    if what == "flaking" and scale is None and 1 <= value <= 5:
+        return Limit(figure, FLAKING_FROM[value - 1], False, group, text)
+    wanted = {"rust": "Ri1 to Ri5, D610:9 to D610:0 or percent", "flaking": "1 to 5 or percent"}
+    raise ValueError(f"must be {what}= with {wanted.get(what, 'percent')}")

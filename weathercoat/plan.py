@@ -92,7 +92,8 @@ def plan_lines(plan: Plan) -> Iterator[str]:
     how = f", {config.deformation.sweeps} a step" if solver in SWEEPING else ""
     faces = f"{config.remesh.faces:,}" if config.remesh else "the model's own"
     yield f"{'faces':18} {faces}"
-    yield f"{'steps':18} {config.ageing.steps:,}"
+    until = " or ".join(config.ageing.until)
+    yield f"{'steps':18} {config.ageing.steps:,}" + (f" at most, until {until}" if until else "")
     yield f"{'deformation':18} " + ("none: the film stays flat" if solver == "none" else solver + how)
     quality = plan.quality
     if quality is not None:
@@ -126,7 +127,7 @@ def refusal_lines(plan: Plan, limit: MemoryLimit | None) -> Iterator[str]:
 
 
 def _view_of(loaded: LoadedConfig, painted: Surface) -> _View | None:
-    per_unit = loaded.config.scene.pixels_per_unit()
+    per_unit = loaded.config.pixels_per_unit()
     if per_unit is None:
         return None
     per_size = per_unit * painted.size()

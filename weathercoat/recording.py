@@ -69,6 +69,7 @@ class SnapshotRecorder:
             self._write(snapshot, simulation)
             residual = simulation.residual()
             size = simulation.frame.size
+            metres = self.config.metres_per_unit()
             figures = measure_snapshot(
                 snapshot,
                 flake_areas=np.asarray(simulation.flake_areas) * size**2,
@@ -76,6 +77,7 @@ class SnapshotRecorder:
                 residual=residual.angle_rms,
                 energy=residual.energy,
                 imbalance=residual.imbalance,
+                millimetres=None if metres is None else 1000.0 * metres,
             )
         if self.config.output.preview:
             with self.watch.time("pictures"):

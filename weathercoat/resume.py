@@ -31,7 +31,13 @@ from weathercoat.output.folder import (
 from weathercoat.output.report import sha256, versions
 from weathercoat.target import target
 
-_FREE = ("ageing.steps", "ageing.duration", "snapshots.", "checkpoint.")  # keys that may differ
+_FREE = (
+    "ageing.steps",
+    "ageing.duration",
+    "ageing.until",
+    "snapshots.",
+    "checkpoint.",
+)  # keys that may differ
 
 
 def identify(config: Config, inputs: Mapping[str, str]) -> dict[str, Any]:
@@ -108,6 +114,14 @@ def take_up(
         return checkpoint
     folder.clear()
     return None
+
+
+def is_past(checkpoint: Checkpoint, config: Config, reached: str | None) -> bool:
+    """Whether the state of a checkpoint has `reached` a limit of `ageing.until` that its run did not stop at,
+    so that the first step at which it is reached is not known.
+    """
+    before = checkpoint.about["config"]["ageing"].get("until", [])
+    return reached is not None and list(config.ageing.until) != before
 
 
 def recorded_figures(checkpoint: Checkpoint, config: Config) -> list[dict[str, Any]]:

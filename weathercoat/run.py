@@ -19,7 +19,15 @@ from weathercoat.config.load import LoadedConfig
 from weathercoat.config.schema import Config
 from weathercoat.cost import require_memory, require_memory_to_read
 from weathercoat.deform.parameters import DeformParameters
-from weathercoat.errors import CheckError, NoFacesError, Note, StrictError, WeathercoatError, printable
+from weathercoat.errors import (
+    CheckError,
+    NoFacesError,
+    Note,
+    ResumeError,
+    StrictError,
+    WeathercoatError,
+    printable,
+)
 from weathercoat.film.state import FilmParameters
 from weathercoat.lock import LOCK
 from weathercoat.masks.evaluate import make_changes, require_masks
@@ -30,7 +38,16 @@ from weathercoat.mesh.read import MAX_BYTES, name_of, read_stream, read_surface,
 from weathercoat.mesh.remesh import RemeshParameters, remesh
 from weathercoat.mesh.surface import Place, Surface
 from weathercoat.output.checkpoints import Checkpoint, read_kept_surface
-from weathercoat.output.folder import PREVIEW, REPORT, SEVERITY, TIMING, UNTOUCHED, RunFolder, kept_in
+from weathercoat.output.folder import (
+    CHECKPOINT_STATE,
+    PREVIEW,
+    REPORT,
+    SEVERITY,
+    TIMING,
+    UNTOUCHED,
+    RunFolder,
+    kept_in,
+)
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.report import (
     make_report,
@@ -44,11 +61,19 @@ from weathercoat.output.report import (
 from weathercoat.output.severity import write_table
 from weathercoat.plan import Plan, make_plan
 from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
-from weathercoat.resume import fingerprint, identify, read_finished, recorded_figures, take_up
+from weathercoat.resume import (
+    fingerprint,
+    identify,
+    is_past,
+    read_finished,
+    recorded_figures,
+    take_up,
+)
 from weathercoat.sim.recorders import Patience, Recorder, run_simulation
 from weathercoat.sim.simulation import Simulation, make_simulation
 from weathercoat.stain.color import Palette
 from weathercoat.stain.rust import StainParameters
+from weathercoat.until import Until, require_groups
 from weathercoat.verification.run import require_whole
 
 _Parameters = TypeVar("_Parameters", FilmParameters, DeformParameters, StainParameters)
@@ -130,6 +155,7 @@ def run_asset(
         config = intake.plan.loaded.config
         identity = identify(config, intake.inputs)
         checkpoint = None
+        was_interrupted = (folder / CHECKPOINT_STATE).is_file()
         if resume:
             finished = read_finished(run_folder.target, identity)
             if finished is not None:
@@ -150,10 +176,28 @@ def run_asset(
         if checkpoint:
             keeper.restore(simulation, checkpoint, recorded_figures(checkpoint, config))
             say(f"going on from step {simulation.step_count:,} of {simulation.steps:,}")
+        until = Until(config.ageing.until, simulation.surface)
+        if checkpoint and is_past(checkpoint, config, until.reached(simulation)):
+            if not was_interrupted:
+                run_folder.clear()  # all that it holds is still in the finished folder
+            what = f"step {checkpoint.step} is past {until.reached(simulation)}"
+            raise ResumeError(what, file=str(out))
         due = config.snapshots.due(config.ageing.steps)
         recorders = [Recorder(due, recorder.record), Recorder(range(simulation.steps), keeper.consider)]
         with patience or nullcontext():
-            run_simulation(simulation, recorders, progress, patience=patience, before_stop=keeper.write)
+            run_simulation(
+                simulation,
+                recorders,
+                progress,
+                patience=patience,
+                before_stop=keeper.write,
+                is_enough=lambda now: until.reached(now) is not None,
+            )
+        stopped = until.why_it_ended(simulation)
+        if config.ageing.until:
+            say(stopped)
+            if simulation.step_count not in due:
+                recorder.record(simulation)
         keeper.finish(simulation)
 
         if intake.untouched is not None:
@@ -167,7 +211,7 @@ def run_asset(
             with watch.time("maps"):
                 is_painted = painted_faces(intake.surface, config)
                 write_run_maps(folder, intake.surface, is_painted, config, threads=threads)
-        report = _report(intake, meshed.notes, simulation, recorder, folder)
+        report = _report(intake, meshed.notes, simulation, recorder, stopped, folder)
         report["fingerprint"] = fingerprint(loaded, intake.inputs)
         write_json(folder / REPORT, report)
         if check:
@@ -198,6 +242,7 @@ def _take_in(
         painted, untouched = split_paint(surface, loaded.config)
         require_maps(surface, loaded.config)
         require_masks(loaded.config.steering, painted, loaded.origins["steering"])
+        require_groups(loaded.config.ageing.until, painted)
         plan = make_plan(loaded, painted, len(surface.faces))
         require_memory(plan.loaded.config, plan.model_faces, limit)
     if plan.quality is not None:
@@ -219,6 +264,7 @@ def _report(
     notes: Sequence[Note],
     simulation: Simulation,
     recorder: SnapshotRecorder,
+    stopped: str,
     folder: Path,
 ) -> dict[str, Any]:
     """The content of `run.json` for a simulation at its end, with all other files in the folder."""
@@ -230,7 +276,7 @@ def _report(
         meshes={"input": measure_surface(intake.surface), "film": measure_surface(simulation.surface)},
         notes=notes,
         quality=intake.plan.quality,
-        stopped=f"reached the end: step {simulation.step_count}, age {simulation.age:g}",
+        stopped=stopped,
         solver=asdict(simulation.solving),
         snapshots=recorder.figures,
         files=manifest(folder),

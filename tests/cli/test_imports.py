@@ -32,6 +32,7 @@ print("LOADED", code, *loaded)
         ["render", "--help"],
         ["view", "--help"],
         ["bake", "--help"],
+        ["severity", "--help"],
         ["verify", "--help"],
         ["compare", "--help"],
         ["baseline", "--help"],

@@ -137,7 +137,7 @@ def test_pixels_are_those_of_a_pinhole() -> None:
     assert Config.model_validate({"scene": scene}).scene.pixels_per_unit() == pytest.approx(500.0)
     nearer = Config.model_validate({"scene": {**scene, "nearest": 0.1}}).scene
     assert nearer.pixels_per_unit() == pytest.approx(5000.0)
-    metres = Config.model_validate({"scene": {"pixels_per_metre": 300, "metres_per_unit": 0.01}}).scene
+    metres = Config.model_validate({"scene": {"pixels_per_metre": 300, "metres_per_unit": 0.01}})
     assert metres.pixels_per_unit() == pytest.approx(3.0)
     assert Config().scene.pixels_per_unit() is None
 

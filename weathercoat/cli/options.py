@@ -57,6 +57,13 @@ assignments = click.option(
 seed = click.option("--seed", type=int, metavar="N", help="Override seed.")
 steps = click.option("--steps", type=int, metavar="N", help="Override ageing.steps.")
 faces = click.option("--faces", type=int, metavar="N", help="Override remesh.faces.")
+until = click.option(
+    "--until",
+    multiple=True,
+    metavar="LIMIT",
+    help="Override ageing.until: stop at the first step that reaches rust=Ri3, flaking=4, bare=12% or the like; "
+    "commas join what has to be reached all, and of several options one is enough.",
+)
 quality = click.option(
     "--quality",
     type=click.Choice([*LEVELS, AUTO]),
@@ -157,13 +164,19 @@ def portable(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def shortcuts(**values: object) -> Iterator[Override]:
-    """What the options `quality`, `seed`, `steps` and `faces` override, of those that were given."""
+    """What the options `quality`, `seed`, `steps`, `faces` and `until` override, of those that were given."""
     from weathercoat.config.load import Override
 
-    keys = {"quality": "quality", "seed": "seed", "steps": "ageing.steps", "faces": "remesh.faces"}
+    keys = {
+        "quality": "quality",
+        "seed": "seed",
+        "steps": "ageing.steps",
+        "faces": "remesh.faces",
+        "until": "ageing.until",
+    }
     for option, value in values.items():
-        if value is not None:
-            yield Override(keys[option], value, f"--{option}")
+        if value is not None and value != ():
+            yield Override(keys[option], list(value) if isinstance(value, tuple) else value, f"--{option}")
 
 
 def require_config_first(config: str, model: str) -> None:

@@ -16,6 +16,7 @@ from weathercoat.memory import memory_limit
 @options.assignments
 @options.quality
 @options.steps
+@options.until
 @options.faces
 @options.model_format
 @options.max_memory
@@ -26,6 +27,7 @@ def command(
     assignments: tuple[str, ...],
     quality: str | None,
     steps: int | None,
+    until: tuple[str, ...],
     faces: int | None,
     model_format: str | None,
     max_memory: int | None,
@@ -48,7 +50,7 @@ def command(
     for config in configs:
         options.require_config_first(config, model)
         options.require_one_reader(config, model)
-    shortcuts = options.shortcuts(quality=quality, steps=steps, faces=faces)
+    shortcuts = options.shortcuts(quality=quality, steps=steps, faces=faces, until=until)
     loaded = load_config(configs[0] if configs else "standard", [*assignments, *shortcuts])
     with Messages(quiet=as_json) as messages, report_compiling(messages.log), name_errors(model):
         surface = read_model(model, model_format, up=loaded.config.model.up, max_memory=max_memory)

@@ -27,6 +27,7 @@ SUBCOMMANDS = (
     "risk",
     "bake",
     "view",
+    "severity",
     "verify",
     "compare",
     "schema",

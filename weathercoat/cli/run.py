@@ -29,6 +29,7 @@ from weathercoat.errors import UsageError
 @options.quality
 @options.seed
 @options.steps
+@options.until
 @options.faces
 @options.model_format
 @options.threads
@@ -51,6 +52,7 @@ def command(
     quality: str | None,
     seed: int | None,
     steps: int | None,
+    until: tuple[str, ...],
     faces: int | None,
     model_format: str | None,
     threads: int | None,
@@ -83,7 +85,7 @@ def command(
         raise UsageError("--to is the format on standard output", remedy=remedy)
     options.require_config_first(config, model)
     options.require_one_reader(config, model)
-    shortcuts = options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces)
+    shortcuts = options.shortcuts(quality=quality, seed=seed, steps=steps, faces=faces, until=until)
     extra = filter.settings(kind) if is_filter else ()
     loaded = load_config(config, [*assignments, *shortcuts, *extra])
     is_piped = model == "-"

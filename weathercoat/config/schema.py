@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import (
+    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
@@ -40,8 +41,10 @@ from weathercoat.config.section import (
     require_number,
 )
 from weathercoat.config.steering import Steer
+from weathercoat.grades import parse_limits
 
 VERSION = 1
+_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 LARGEST_SEED = 2**63 - 1
 
 
@@ -65,6 +68,11 @@ def _parse_up(value: object) -> object:
     raise ValueError("must be auto, x, y, z, -x, -y, -z or three numbers that are not all 0")
 
 
+def _require_limit(text: str) -> str:
+    parse_limits(text)
+    return text
+
+
 def _parse_remesh(value: object) -> object:
     """A mapping as it is, {} for on, which means the defaults, and false for off."""
     if isinstance(value, bool | str) and value in (True, False, *SWITCH):
@@ -84,6 +92,12 @@ _FORMAT_SCHEMA = {"type": "string", "enum": ["ply", "glb"]}
 
 Axis = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
 PositiveOrNone = Annotated[float, Field(gt=0, le=1e9), BeforeValidator(require_number)] | None
+Limits = Annotated[
+    tuple[Annotated[str, AfterValidator(_require_limit)], ...],
+    BeforeValidator(at_least_one_word),
+    Words("limit or list of limits"),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
 Color = Annotated[
     tuple[int, int, int],
     BeforeValidator(_parse_color),
@@ -109,6 +123,9 @@ class Model(Section):
     up: Annotated[Axis | tuple[float, float, float], BeforeValidator(_parse_up)] = parameter(
         "auto", "The direction against gravity in the model's axes; auto follows the convention of its format"
     )
+    units: Literal["none", "m", "cm", "mm", "um", "in", "ft"] = parameter(
+        "none", "What a unit of the model is, so that sizes are told in millimetres too"
+    )
 
 
 class Scene(Section):
@@ -127,16 +144,16 @@ class Scene(Section):
     pixels_per_metre: PositiveOrNone = parameter(
         None, "Pixels for a metre of the surface, instead of a camera", unit="pixels per metre"
     )
-    metres_per_unit: Real = parameter(
-        1.0, "Length of a unit of the model, for pixels_per_metre", unit="metres", gt=0, le=1e9
+    metres_per_unit: PositiveOrNone = parameter(
+        None, "Length of a unit of the model, where it is none of model.units", unit="metres"
     )
 
-    def pixels_per_unit(self) -> float | None:
-        """Pixels for a unit of the model where it is nearest to the camera; None where the scene does not
-        tell.
+    def pixels_per_unit(self, metres: float = 1.0) -> float | None:
+        """Pixels for a unit of the model, of so many metres, where it is nearest to the camera; None where
+        the scene does not tell.
         """
         if self.pixels_per_metre is not None:
-            return self.pixels_per_metre * self.metres_per_unit
+            return self.pixels_per_metre * metres
         away = self.distance if self.nearest is None else self.nearest
         if away is None:
             return None
@@ -170,6 +187,9 @@ class Ageing(Section):
         le=10_000_000,
     )
     duration: Real = parameter(1.0, "Age that the run covers", unit="ages", ge=1e-9, le=1000)
+    until: Limits = parameter(
+        (), "Severity at which the run stops, such as rust=Ri3 or bare=12%; of several the first reached"
+    )
 
 
 class Tension(Section):
@@ -565,9 +585,21 @@ class Config(Section):
         found += unused_values(self.physical)
         if self.maps.when != "never" and "ply" not in self.output.formats:
             found.append(("maps.when", "maps are made of snapshots in PLY; add ply to output.formats"))
-        if self.quality == "auto" and scene.pixels_per_unit() is None:
+        if self.quality == "auto" and self.pixels_per_unit() is None:
             found.append(("quality", "auto needs scene.distance, scene.nearest or scene.pixels_per_metre"))
         return found
+
+    def metres_per_unit(self) -> float | None:
+        """Length of a unit of the model in metres: scene.metres_per_unit, else model.units; None where
+        neither tells.
+        """
+        return self.scene.metres_per_unit or _METRES.get(self.model.units)
+
+    def pixels_per_unit(self) -> float | None:
+        """Pixels for a unit of the model, which is a metre unless something else is said; None where the
+        scene does not tell.
+        """
+        return self.scene.pixels_per_unit(self.metres_per_unit() or 1.0)
 
     def as_dict(self) -> dict[str, Any]:
         """The resolved values under the file's keys, as plain lists, numbers and text."""

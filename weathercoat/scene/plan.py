@@ -109,7 +109,7 @@ def plan_scene(scene: Scene, choices: Choices | None = None) -> ScenePlan:
     rules = {item.name: _decision(scene, item.name, choices) for item in scene.objects}
     wanted = [item for item in scene.objects if not item.kept and rules[item.name].weathered is not False]
     names = [item.name for item in wanted]
-    metres = configs.of(Rule("*")).config.scene.metres_per_unit
+    metres = configs.of(Rule("*")).config.metres_per_unit() or 1.0
     exposure = measure_exposure(scene, names, near=SPLASH_HEIGHT / metres)
     weathering = {name: weather(exposure[name], metres, rules[name].exposure) for name in names}
     distances = nearest_distances(scene, names)
@@ -227,5 +227,6 @@ def _seen(loaded: LoadedConfig, variant: Variant, *, has_camera: bool) -> Loaded
         return with_values(loaded, {"scene.nearest": nearest}, _CAMERA)
     if scene.pixels_per_metre is not None:
         largest = max(member.placement.scale for member in variant.members)
-        return with_values(loaded, {"scene.metres_per_unit": scene.metres_per_unit * largest}, "the scene")
+        metres = (loaded.config.metres_per_unit() or 1.0) * largest
+        return with_values(loaded, {"scene.metres_per_unit": metres}, "the scene")
     return loaded

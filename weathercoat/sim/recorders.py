@@ -40,8 +40,10 @@ def run_simulation(
     until: int | None = None,
     patience: Patience | None = None,
     before_stop: Callable[[Simulation], None] | None = None,
+    is_enough: Callable[[Simulation], bool] | None = None,
 ) -> None:
-    """Step to the end, or to the step `until`; `progress` is called with the steps done and their number.
+    """Step to the end, to the step `until`, or to the first at which `is_enough`; `progress` is called with
+    the steps done and their number.
 
     A simulation at its start is recorded before the first step; one that goes on was recorded there already.
     patience: where it is asked to stop, that is done after the step, and after calling `before_stop`.
@@ -49,7 +51,7 @@ def run_simulation(
     last = simulation.steps if until is None else min(until, simulation.steps)
     if simulation.step_count == 0:
         _record(simulation, recorders)
-    while simulation.step_count < last:
+    while simulation.step_count < last and not (is_enough and is_enough(simulation)):
         simulation.step()
         _record(simulation, recorders)
         if progress is not None:
