@@ -61,8 +61,8 @@ until = click.option(
     "--until",
     multiple=True,
     metavar="LIMIT",
-    help="Override ageing.until: stop at the first step that reaches rust=Ri3, flaking=4, bare=12% or the like; "
-    "commas join what has to be reached all, and of several options one is enough.",
+    help="Override ageing.until: stop at the first step that reaches rust=Ri3, flaking=4, bare=12% or the "
+    "like; commas join what has to be reached all, and of several options one is enough.",
 )
 quality = click.option(
     "--quality",
