@@ -8,6 +8,7 @@
     python docs/make.py gallery             every shipped config on five parts, images/gallery
     python docs/make.py first               the picture of the README
     python docs/make.py yard                the picture of exposure.md
+    python docs/make.py viewer              the pictures of viewer.md; needs Chromium
     python docs/make.py speed --results FOLDER
                                             performance.md with what `weathercoat bench speed -o FOLDER` wrote
     python docs/make.py accuracy --results FOLDER
@@ -40,9 +41,10 @@ from making import (
     scenes,
     speed,
     stability,
+    viewer,
 )
 
-PARTS = ("pages", "effects", "comparison", "gallery", "first", "yard")
+PARTS = ("pages", "effects", "comparison", "gallery", "first", "yard", "viewer")
 RESULTS = {
     "speed": speed.take_results,
     "accuracy": accuracy.take_results,
@@ -83,6 +85,8 @@ def main() -> None:
         gallery.draw_first()
     if "yard" in parts:
         scenes.draw_yard()
+    if "viewer" in parts:
+        viewer.draw_viewer()
     for part in parts:
         if part in RESULTS:
             RESULTS[part](wanted.results)

@@ -12,7 +12,11 @@ from weathercoat.cli.writing import STANDARD_OUTPUT, open_output, say_written
 from weathercoat.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from weathercoat.finished import FinishedRun
+    from weathercoat.mesh.surface import Vectors
+    from weathercoat.sim.snapshot import Snapshot
 
 
 class _Steps(click.ParamType):
@@ -38,6 +42,16 @@ class _Steps(click.ParamType):
 @click.option(
     "--after", type=int, metavar="N", help="and that of this one to its right; by default the last."
 )
+@click.option(
+    "--risk",
+    is_flag=True,
+    help="Lay over it, too, how near the film is to letting go; simulates the run again.",
+)
+@click.option(
+    "--model",
+    type=click.Path(path_type=Path),
+    help="The model of the run, for --risk, where it is not beside the run or in the working folder.",
+)
 @options.overwrite
 @options.as_json
 @options.debug
@@ -48,6 +62,8 @@ def command(
     step: int | None,
     before: int | None,
     after: int | None,
+    risk: bool,
+    model: Path | None,
     overwrite: bool,
     as_json: bool,
 ) -> None:
@@ -76,14 +92,16 @@ def command(
         finished = open_run(run)
         wanted = _wanted(finished, steps, step, before, after)
         rows = {int(row["step"]): row for row in finished.report["snapshots"]}
+        snapshots = [finished.read_snapshot(number) for number in wanted]
         write_page(
             stream,
-            [finished.read_snapshot(number) for number in wanted],
+            snapshots,
             [rows[number] for number in wanted],
             picture_parameters(finished.config),
             name=Path(next(iter(finished.report["inputs"]))).stem,
             up=finished.up,
             untouched=finished.untouched,
+            risk=_risk(finished, snapshots, model, messages.log) if risk else None,
             start=Start(after if step is None else step, before),
         )
     say_written(output, as_json=as_json)
@@ -100,3 +118,22 @@ def _wanted(finished: FinishedRun, steps: tuple[int, ...] | None, *shown: int | 
                 remedy=f"there are {', '.join(map(str, finished.steps))}",
             )
     return sorted({*wanted, *(each for each in shown if each is not None)})
+
+
+def _risk(
+    finished: FinishedRun, snapshots: list[Snapshot], model: Path | None, say: Callable[[str], None]
+) -> dict[int, Vectors]:
+    """By step, the ratio of lift to adhesion of each vertex of the film, 1 where it has let go."""
+    import numpy as np
+
+    from weathercoat.restore import restore_simulation
+    from weathercoat.sim.risk import assess_risk
+
+    simulation = restore_simulation(finished, snapshots[0].step, model=model, say=say)
+    ratios = {}
+    for snapshot in snapshots:
+        while simulation.step_count < snapshot.step:
+            simulation.step()
+        ratio = assess_risk(simulation, horizon=0).separation[snapshot.film_origin]
+        ratios[snapshot.step] = np.where(snapshot.separated, 1.0, ratio)
+    return ratios

@@ -13,6 +13,24 @@ const LABELS = {
   film_rust: "Rust on the film",
   dust: "Dirt",
 };
+const SEVERITY = {
+  rusted_percent: "Rusted",
+  flaked_percent: "Flaked",
+  cracked_percent: "Cracked",
+  lifted_percent: "Lifted",
+  runoff_percent: "Stained by rust",
+  dirt_percent: "Dirty",
+  "grades.iso_4628_3": "as ISO 4628-3, rust",
+  "grades.iso_4628_5": "as ISO 4628-5, flaking",
+  "grades.astm_d610": "as ASTM D610, rust",
+  "patches.count": "Bare patches",
+  "patches.largest_length": "Longest patch",
+  "rust_patches.count": "Rust patches",
+  "cracks.length": "Cracks",
+  "cracks.density": "Crack density",
+  "junctions.count": "Crack junctions",
+  "junctions.median_angle": "Median angle",
+};
 const [WIDTH, HEIGHT] = [88, 22];
 
 /** Numbers and texts of nested figures by dotted name; lists are left out. */
@@ -25,12 +43,6 @@ export function flatten(figures, prefix = "") {
     }
   }
   return rows;
-}
-
-function labelOf(name) {
-  if (LABELS[name]) return LABELS[name];
-  const words = name.replace(/_(percent|share)$/, "").replaceAll("_", " ").split(".");
-  return words.map((word, i) => (i ? word : word.charAt(0).toUpperCase() + word.slice(1))).join(" \u00b7 ");
 }
 
 function format(name, value) {
@@ -53,12 +65,12 @@ function curve(ages, values) {
 export function makeFigures(body, snapshots) {
   const ages = snapshots.map((snapshot) => snapshot.age);
   const updates = [];
-  const add = (parent, rows, name) => {
+  const add = (parent, rows, name, text) => {
     const values = rows.map((row) => row[name]);
     const row = parent.appendChild(document.createElement("div"));
     row.className = "figure";
     const label = row.appendChild(document.createElement("span"));
-    label.textContent = labelOf(name);
+    label.textContent = text;
     const value = document.createElement("output");
     let dot = null;
     if (snapshots.length > 1 && values.some((each) => typeof each === "number")) {
@@ -78,22 +90,26 @@ export function makeFigures(body, snapshots) {
       dot?.circle.setAttribute("cy", dot.points[i][1]);
     });
   };
-  const whole = snapshots.map(({ figures }) => flatten(figures));
-  for (const name of Object.keys(LABELS)) if (whole.some((row) => name in row)) add(body, whole, name);
-  const severity = snapshots.map(({ severity }) => severity ?? {});
-  const groups = [...new Set(severity.flatMap((each) => Object.keys(each)))];
-  const loose = groups.filter((name) => severity.some((each) => typeof each[name] !== "object"));
-  for (const name of [null, ...groups.filter((name) => !loose.includes(name))]) {
-    const rows = severity.map((each) =>
-      flatten(name === null ? Object.fromEntries(loose.map((key) => [key, each[key]])) : each[name]),
-    );
-    const names = [...new Set(rows.flatMap((row) => Object.keys(row)))];
-    if (!names.length) continue;
-    const group = body.appendChild(document.createElement("details"));
-    group.open = name === null || name === "whole";
-    const title = group.appendChild(document.createElement("summary"));
-    title.textContent = name === null || name === "whole" ? "Severity" : labelOf(name);
-    for (const each of names) add(group, rows, each);
+  const addGroup = (parent, all, labels) => {
+    const rows = all.map((each) => flatten(each));
+    for (const [name, text] of Object.entries(labels)) {
+      if (rows.some((row) => name in row)) add(parent, rows, name, text);
+    }
+  };
+  addGroup(body, snapshots.map(({ figures }) => figures), LABELS);
+  const severity = snapshots.map((snapshot) => snapshot.severity);
+  const addSeverity = (title, of, isOpen) => {
+    const all = severity.map(of);
+    if (!all.some(Boolean)) return;
+    const details = body.appendChild(document.createElement("details"));
+    details.open = isOpen;
+    details.appendChild(document.createElement("summary")).textContent = title;
+    addGroup(details, all, SEVERITY);
+  };
+  addSeverity("Severity", (each) => each.whole, true);
+  for (const kind of ["groups", "parts"]) {
+    const names = new Set(severity.flatMap((each) => Object.keys(each[kind] ?? {})));
+    for (const name of names) addSeverity(`Severity: ${name}`, (each) => each[kind]?.[name], false);
   }
   return (i) => updates.forEach((update) => update(i));
 }

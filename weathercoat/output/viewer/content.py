@@ -23,8 +23,8 @@ from weathercoat.output.viewer.occlusion import bake_occlusion
 from weathercoat.sim.snapshot import Snapshot
 
 STEPS = 65_535  # of the grid, along the longest side of its box
-MOST_FACES = 4_000_000  # of metal and film in all snapshots: a page of some 60 MB
-STRAIN_RANGE = 0.1  # the overlay's ends; what is strained more looks like the end
+MOST_FACES = 4_000_000  # of metal and film in all snapshots: a page of some 20 MB
+STRAIN_RANGE = 0.05  # the overlay's ends; what is strained more looks like the end
 
 
 @dataclass(frozen=True)
