@@ -114,6 +114,9 @@ def main() -> None:
         )
         for step in finished.steps:
             snapshot = finished.read_snapshot(step)
+            if snapshot.surface is not None:
+                whole = replace(snapshot.surface, parts=surface.parts, materials=surface.materials)
+                snapshot = replace(snapshot, surface=whole)
             values = []
             for shrink, name in ((1, "near"), (4, "afar")):
                 save = arguments.save and arguments.save / f"{run.name}_{step}_{name}.png"

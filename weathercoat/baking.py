@@ -106,6 +106,9 @@ def summary(written: list[dict[str, Any]]) -> list[str]:
     said = []
     if mirrored:
         said.append(f"{mirrored:,} faces show their texture mirrored; their normals are turned to suit")
+    flat = sum(tile["faces_without_area"] for tile in tiles)
+    if flat:
+        said.append(f"{flat:,} faces have no area in texture space, and show a single colour each")
     if overlapping > 0.0:
         said.append(
             f"{overlapping:.1%} of the texels belong to several faces, and show the first: "
