@@ -9,6 +9,7 @@
     python docs/make.py first               the picture of the README
     python docs/make.py yard                the picture of exposure.md
     python docs/make.py viewer              the pictures of viewer.md; needs Chromium
+    python docs/make.py steering            the pictures of steering.md, images/steering
     python docs/make.py speed --results FOLDER
                                             performance.md with what `weathercoat bench speed -o FOLDER` wrote
     python docs/make.py accuracy --results FOLDER
@@ -41,10 +42,11 @@ from making import (
     scenes,
     speed,
     stability,
+    steering,
     viewer,
 )
 
-PARTS = ("pages", "effects", "comparison", "gallery", "first", "yard", "viewer")
+PARTS = ("pages", "effects", "comparison", "gallery", "first", "yard", "steering", "viewer")
 RESULTS = {
     "speed": speed.take_results,
     "accuracy": accuracy.take_results,
@@ -79,6 +81,8 @@ def main() -> None:
         effects.draw_effects(wanted.key)
     if "comparison" in parts:
         gallery.draw_comparison()
+    if "steering" in parts:
+        steering.draw_steering()
     if "gallery" in parts:
         gallery.draw_gallery(wanted.config)
     if "first" in parts:
