@@ -31,6 +31,7 @@ print("LOADED", code, *loaded)
         ["inspect", "--help"],
         ["render", "--help"],
         ["view", "--help"],
+        ["risk", "--help"],
         ["bake", "--help"],
         ["severity", "--help"],
         ["verify", "--help"],
