@@ -69,6 +69,21 @@ class FinishedRun:
             )
         return read_snapshot_ply(files[wanted])
 
+    def find_model(self, model: Path | None = None) -> Surface | None:
+        """As `read_model`, but None where no model is given and none is found."""
+        if model is not None:
+            return self.read_model(model)
+        return self.read_model(self._beside()) if self._beside() is not None else None
+
+    def _beside(self) -> Path | None:
+        """The run's model, where it is beside its folder or in the working one."""
+        name = self.report["model"]
+        digest = self.report["inputs"][name]["sha256"]
+        for place in (self.path.parent / name, Path(name)):
+            if place.is_file() and sha256(place) == digest:
+                return place
+        return None
+
     def read_model(self, model: Path | None = None) -> Surface:
         """The model of the run as it was read then, repaired; by default the file of its name beside the
         run's folder or in the working folder.
@@ -77,18 +92,16 @@ class FinishedRun:
         `read_surface` raises.
         """
         name = self.report["model"]
-        digest = self.report["inputs"][name]["sha256"]
-        places = [self.path.parent / name, Path(name)] if model is None else [model]
-        for place in places:
-            if place.is_file() and sha256(place) == digest:
-                return read_surface(place, up=self.config.model.up)
-        if model is not None and model.is_file():
+        place = self._beside() if model is None else model
+        if place is None or not place.is_file():
             raise UsageError(
-                f"is not the model of the run {self.path}, which was made of {name}", file=name_of(model)
+                f"the model of the run, {name}, is not there", file=str(model or name), remedy="give --model"
             )
-        raise UsageError(
-            f"the model of the run, {name}, is not there", file=str(model or name), remedy="give --model"
-        )
+        if sha256(place) != self.report["inputs"][name]["sha256"]:
+            raise UsageError(
+                f"is not the model of the run {self.path}, which was made of {name}", file=name_of(place)
+            )
+        return read_surface(place, up=self.config.model.up)
 
 
 def open_run(path: Path | str) -> FinishedRun:

@@ -24,6 +24,7 @@ SUBCOMMANDS = (
     "inspect",
     "remesh",
     "render",
+    "export",
     "risk",
     "bake",
     "view",

@@ -38,13 +38,13 @@ def transfer(
     if given.uv is not None:
         seams = find_seams(given.uv, source.twin) | borders
         corner = _find_corners(result.faces, source, seams, below, place, points, given.face_group)
-        uv = _blend(given.uv[corner.face], corner.barycentric).reshape(-1, 3, 2)
+        uv = blend(given.uv[corner.face], corner.barycentric).reshape(-1, 3, 2)
     if given.normals is not None:
         hard = find_jumps(given.normals, source.twin, _SMOOTH) | borders
         corner = _find_corners(result.faces, source, hard, below, place, points, given.face_group)
-        normals = _unit(_blend(given.normals[corner.face], corner.barycentric), source.normals[corner.face])
+        normals = _unit(blend(given.normals[corner.face], corner.barycentric), source.normals[corner.face])
     if given.colors is not None:
-        colors = _blend(given.colors[given.faces[place.face]], place.barycentric)
+        colors = blend(given.colors[given.faces[place.face]], place.barycentric)
     return replace(
         result,
         uv=uv,
@@ -145,7 +145,7 @@ def _search(
     return best
 
 
-def _blend(corners: Vectors, barycentric: Vectors) -> Vectors:
+def blend(corners: Vectors, barycentric: Vectors) -> Vectors:
     """Values (k, 3, j) at the corners of faces, blended by weights (k, 3); (k, j)."""
     weighted: Vectors = (
         corners[:, 0] * barycentric[:, :1]

@@ -47,7 +47,8 @@ class Sheet:
     vertices (k, 3), in the axes of the model; faces (m, 3); normals (k, 3), unit; colors (k, 3), linear RGB
     0 to 1, or None; uv (k, 2), origin at the lower left as in OBJ, or None; scalars: custom attributes
     (k,), whose names begin with an underscore. role: what it is of a snapshot, `film`, `back`, `rim`,
-    `substrate` or `untouched`; part: the number in `Surface.parts` of what it is of, or -1.
+    `substrate` or `untouched`; part: the number in `Surface.parts` of what it is of, or -1; piece: the
+    number of a loose piece of film from 1, 0 for what is none.
     """
 
     material: Material
@@ -59,14 +60,19 @@ class Sheet:
     scalars: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     role: str = ""
     part: int = -1
+    piece: int = 0
 
 
 @dataclass(frozen=True)
 class Node:
-    """A named node with one mesh. Sheets without faces are left out, since glTF has no empty ones."""
+    """A named node with one mesh. Sheets without faces are left out, since glTF has no empty ones.
+
+    pivot: the point (3,) that the node stands at, and its vertices are about; None for that of the root.
+    """
 
     name: str
     sheets: Sequence[Sheet]
+    pivot: Vectors | None = None
 
 
 def write_glb(
@@ -91,11 +97,14 @@ def write_glb(
     materials = MaterialTable(buffer)
     for node in nodes:
         entry: dict[str, Any] = {"name": node.name}
+        origin = center if node.pivot is None else node.pivot
+        if node.pivot is not None:
+            entry["translation"] = [float(x) for x in rotation @ (node.pivot - center)]
         sheets = [sheet for sheet in node.sheets if len(sheet.faces)]
         primitives = []
         for sheet in sheets:
             number = materials.number(sheet.material)
-            primitives.append({**buffer.add_sheet(sheet, center, rotation), "material": number})
+            primitives.append({**buffer.add_sheet(sheet, origin, rotation), "material": number})
         if primitives:
             entry["mesh"] = len(meshes)
             meshes.append({"name": node.name, "primitives": primitives})

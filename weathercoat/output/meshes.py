@@ -55,13 +55,13 @@ def _write_obj(stream: BinaryIO, surface: Surface) -> None:
     columns = surface.vertices
     if surface.colors is not None:
         columns = np.column_stack([columns, surface.colors[:, :3]])
-    for text in _lines("v" + " %r" * columns.shape[1] + "\n", columns):
+    for text in text_lines("v" + " %r" * columns.shape[1] + "\n", columns):
         stream.write(text)
     corner = surface.faces + 1
     row = "f %d %d %d\n"
     if surface.uv is not None:
         rows, index = np.unique(surface.uv.reshape(-1, 2), axis=0, return_inverse=True)
-        for text in _lines("vt %r %r\n", rows):
+        for text in text_lines("vt %r %r\n", rows):
             stream.write(text)
         corner = np.stack([corner, index.reshape(-1, 3) + 1], axis=2).reshape(-1, 6)
         row = "f %d/%d %d/%d %d/%d\n"
@@ -70,7 +70,7 @@ def _write_obj(stream: BinaryIO, surface: Surface) -> None:
         if len(chosen):
             if surface.groups != ("default",):
                 stream.write(f"g {'_'.join(name.split())}\n".encode("utf-8", "replace"))
-            for text in _lines(row, chosen):
+            for text in text_lines(row, chosen):
                 stream.write(text)
 
 
@@ -98,9 +98,9 @@ def _write_stl(stream: BinaryIO, surface: Surface) -> None:
 
 def _write_off(stream: BinaryIO, surface: Surface) -> None:
     stream.write(f"OFF\n{len(surface.vertices)} {len(surface.faces)} 0\n".encode())
-    for text in _lines("%r %r %r\n", surface.vertices):
+    for text in text_lines("%r %r %r\n", surface.vertices):
         stream.write(text)
-    for text in _lines("3 %d %d %d\n", surface.faces):
+    for text in text_lines("3 %d %d %d\n", surface.faces):
         stream.write(text)
 
 
@@ -111,7 +111,7 @@ def _write_glb(stream: BinaryIO, surface: Surface) -> None:
     write_glb(stream, surface_nodes(surface), up=surface.up)
 
 
-def _lines(row: str, table: NDArray[Any]) -> Iterator[bytes]:
+def text_lines(row: str, table: NDArray[Any]) -> Iterator[bytes]:
     """Rows of numbers as text; `%r` gives the fewest digits that read back as the same double."""
     for start in range(0, len(table), ROWS):
         chunk = table[start : start + ROWS]

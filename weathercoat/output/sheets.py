@@ -28,6 +28,7 @@ def make_sheet(
     normals: Vectors | None = None,
     role: str = "",
     part: int = -1,
+    piece: int = 0,
 ) -> Sheet:
     """A sheet with its normals: smooth, but split where faces meet by more than `crease` [rad].
 
@@ -48,6 +49,7 @@ def make_sheet(
         scalars={name: scalar[source] for name, scalar in (scalars or {}).items()},
         role=role,
         part=part,
+        piece=piece,
     )
 
 

@@ -8,7 +8,7 @@ painted part is the paint, and the metal lies beneath it. Removing film never ha
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -212,9 +212,10 @@ def film_sheets(
     thickness: float,
     back_color: tuple[float, float, float] | None,
     look: Look | None = None,
+    pieces: Indices | None = None,
 ) -> list[Sheet]:
     """The film's front, and where it has a thickness its back and rim; a sheet of each for each part of the
-    model. See `write_snapshot_glb`.
+    model, and for each of the `pieces` (m,) that the film's faces belong to. See `write_snapshot_glb`.
     """
     faces, surface, film_face = snapshot.film_faces, snapshot.surface, snapshot.film_face
     uv = None if surface is None or surface.uv is None else surface.uv[film_face]
@@ -228,7 +229,7 @@ def film_sheets(
     is_shell = thickness > 0.0
     if is_shell:
         shell = make_shell(snapshot.film_vertices, faces, thickness, bevel=BEVEL * thickness)
-        vertices, owners = shell.vertices, np.repeat(open_edges(faces)[2], 2)
+        vertices, rims = shell.vertices, _Rims(np.repeat(open_edges(faces)[2], 2), len(faces))
         under = srgb_to_linear(snapshot.film_color if back_color is None else back_color)
         under = np.tile(np.broadcast_to(under, (len(snapshot.film_vertices), 3)), (2, 1))
         scalars = {name: np.tile(values, 2) for name, values in scalars.items()}
@@ -237,7 +238,7 @@ def film_sheets(
     copies = 2 if is_shell else 1
     normals = _front_normals(snapshot, vertices)
     sheets = []
-    for part, chosen in _by_part(surface, film_face):
+    for part, piece, chosen in _by_piece(surface, film_face, pieces):
         material, colors = _front_look(snapshot, part, look)
         sheets.append(
             _used_sheet(
@@ -251,13 +252,16 @@ def film_sheets(
                 uv=uv,
                 role="film",
                 part=part,
+                piece=piece,
             )
         )
         if is_shell:
-            rim = np.flatnonzero(np.isin(owners, chosen))
+            rim = rims.of(chosen)
             for role, triangles, rows in (("back", shell.back, chosen), ("rim", shell.rim, rim)):
                 sheets.append(
-                    _used_sheet(PRIMER, vertices, triangles, rows, under, scalars, role=role, part=part)
+                    _used_sheet(
+                        PRIMER, vertices, triangles, rows, under, scalars, role=role, part=part, piece=piece
+                    )
                 )
     return sheets
 
@@ -274,6 +278,35 @@ def _by_part(surface: Surface | None, faces: Indices) -> list[tuple[int, NDArray
     return [
         (n, order[bounds[n] : bounds[n + 1]]) for n in range(len(surface.parts)) if bounds[n] < bounds[n + 1]
     ]
+
+
+class _Rims:
+    """The rim's faces by the face of the film that each belongs to, `owners` (b,), of `count` faces."""
+
+    def __init__(self, owners: NDArray[np.integer], count: int) -> None:
+        self._order = np.argsort(owners, kind="stable")
+        self._first = np.searchsorted(owners[self._order], np.arange(count + 1))
+
+    def of(self, faces: NDArray[np.integer]) -> NDArray[np.intp]:
+        """The rim's faces of some of the film's faces (k,)."""
+        counts = self._first[faces + 1] - self._first[faces]
+        starts = np.repeat(self._first[faces] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+        return np.sort(self._order[starts + np.arange(len(starts))])
+
+
+def _by_piece(
+    surface: Surface | None, faces: Indices, pieces: Indices | None
+) -> Iterator[tuple[int, int, NDArray[np.intp]]]:
+    """As `_by_part`, with the number of the piece between."""
+    for part, chosen in _by_part(surface, faces):
+        if pieces is None:
+            yield part, 0, chosen
+            continue
+        own = pieces[chosen]
+        order = np.argsort(own, kind="stable")
+        numbers, first = np.unique(own[order], return_index=True)
+        for number, rows in zip(numbers.tolist(), np.split(chosen[order], first[1:]), strict=True):
+            yield part, number, np.sort(rows)
 
 
 def _front_look(snapshot: Snapshot, part: int, look: Look | None) -> tuple[Material, Vectors]:
@@ -313,6 +346,7 @@ def _used_sheet(
     uv: Vectors | None = None,
     role: str,
     part: int,
+    piece: int = 0,
 ) -> Sheet:
     """A sheet of the chosen faces (k,), with the vertices that they use."""
     used, renumbered = np.unique(faces[chosen], return_inverse=True)
@@ -327,6 +361,7 @@ def _used_sheet(
         uv=None if uv is None else uv[chosen],
         role=role,
         part=part,
+        piece=piece,
     )
 
 
