@@ -112,7 +112,7 @@ class _Exporter:
                 self.folder / "run.usdc",
                 self._frames(),
                 up=self.run.up,
-                metres_per_unit=self.run.config.scene.metres_per_unit,
+                metres_per_unit=self.run.config.metres_per_unit() or 1.0,
             )
 
     def _frames(self) -> Iterator[Frame]:
