@@ -206,7 +206,7 @@ def run_asset(
         if config.output.preview:
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
-        (folder / SEVERITY).write_text(write_table(rounded(recorder.figures)), newline="")
+        (folder / SEVERITY).write_text(write_table(rounded(recorder.figures)), "utf-8", newline="")
         if config.maps.when != "never":
             with watch.time("maps"):
                 is_painted = painted_faces(intake.surface, config)
