@@ -206,7 +206,8 @@ def run_asset(
         if config.output.preview:
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
-        (folder / SEVERITY).write_text(write_table(rounded(recorder.figures)), "utf-8", newline="")
+        table = write_table(rounded(recorder.figures))
+        (folder / SEVERITY).write_bytes(table.encode("utf-8", "backslashreplace"))
         if config.maps.when != "never":
             with watch.time("maps"):
                 is_painted = painted_faces(intake.surface, config)
