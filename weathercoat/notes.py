@@ -53,7 +53,7 @@ _TEXTS: dict[str, tuple[str, str]] = {
     ),
     "W-MATERIAL": (
         "A material library or a picture is not beside the model.",
-        "Put it there if `paint.only` or `paint.except` need the names of materials.",
+        "Put it there if its colours should show, or if `paint.only` or `paint.except` name materials.",
     ),
     "W-MORPH": ("The file has morph targets, which are not kept.", "Export the wanted shape."),
     "W-NONFINITE": (

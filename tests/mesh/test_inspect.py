@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
 import pytest
 
 from weathercoat.mesh.inspect import inspect_surface, self_intersecting_faces
-from weathercoat.mesh.surface import Surface, make_surface
+from weathercoat.mesh.materials import SourceMaterial, Texture
+from weathercoat.mesh.surface import Part, Surface, make_surface
 
 
 def grid(count: int) -> Surface:
@@ -114,3 +116,21 @@ def test_self_intersections_agree_with_all_pairs() -> None:
 def test_neighbours_and_flat_sheets_do_not_count() -> None:
     assert not self_intersecting_faces(grid(6).vertices, grid(6).faces).any()
     assert not self_intersecting_faces(tetrahedron().vertices, tetrahedron().faces).any()
+
+
+def test_what_the_surface_carries_is_told() -> None:
+    plain = grid(4)
+    corner = plain.vertices[plain.faces]
+    moved = corner[..., :2] + 2.0 * (corner[..., 0].mean(axis=1) > 0.5)[:, None, None]
+    wood = SourceMaterial("wood", {}, (Texture(b"", "image/png"),))
+    whole = np.zeros(len(plain.faces), np.int32)
+    surface = dataclasses.replace(
+        plain, uv=moved, materials=(wood,), parts=(Part("door", 0), Part("hinge", 0)), face_part=whole
+    )
+    facts = inspect_surface(surface)
+    assert facts["texture"] == {"charts": 2, "seam_edges": 4, "seam_length": pytest.approx(1.0)}
+    assert facts["materials"] == [{"name": "wood", "textures": 1, "has_base_texture": False}]
+    assert facts["parts"] == [{"name": "door", "faces": 32}, {"name": "hinge", "faces": 0}]
+    assert not facts["has_normals"]
+    assert inspect_surface(plain)["texture"] is None
+    json.dumps(facts, allow_nan=False)

@@ -54,6 +54,14 @@ def test_texture_coordinates_come_back_with_their_seam(tmp_path: Path) -> None:
     assert len(back.vertices) == len(surface.vertices)
 
 
+def test_ply_keeps_texture_coordinates_of_corners(tmp_path: Path) -> None:
+    surface = make_grouped_surface()
+    write_mesh(tmp_path / "a.ply", surface)
+    back = read_surface(tmp_path / "a.ply")
+    np.testing.assert_array_equal(back.vertices[back.faces], surface.vertices[surface.faces])
+    np.testing.assert_allclose(back.uv, surface.uv, atol=1e-6)
+
+
 def test_text_keeps_every_digit(tmp_path: Path) -> None:
     vertices = np.random.default_rng(1).normal(size=(30, 3)) * 10.0 ** np.arange(-15, 15)[:, None]
     faces = np.arange(30).reshape(-1, 3)

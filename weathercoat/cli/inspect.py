@@ -102,6 +102,14 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
             yield from (f"{'note':18} {note['code']}({note['count']}): {note['message']}" for note in value)
         elif key == "groups":
             yield from (f"{'group':18} {group['name']}: {group['faces']:,} faces" for group in value)
+        elif key == "parts":
+            yield from (f"{'part':18} {part['name']}: {part['faces']:,} faces" for part in value)
+        elif key == "materials":
+            yield from (
+                f"{'material':18} {material['name']}: {material['textures']} textures" for material in value
+            )
+        elif value is None:
+            continue
         elif key == "run_cost":
             yield f"{'a run would take':18} about {value['seconds']:,.0f} s and {value['memory_mb']:,} MB"
         elif isinstance(value, dict):

@@ -1,4 +1,6 @@
-"""What `weathercoat inspect` tells of a surface: sizes, topology, sharp edges, groups, self-intersections."""
+"""What `weathercoat inspect` tells of a surface: sizes, topology, sharp edges, groups, what it carries,
+self-intersections.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ from weathercoat.compile import kernel
 from weathercoat.errors import Note
 from weathercoat.mesh import topology
 from weathercoat.mesh.buckets import order_codes
+from weathercoat.mesh.charts import find_seams, number_charts
 from weathercoat.mesh.surface import Surface, face_normals
 from weathercoat.mesh.topology import cross, dot
 from weathercoat.mesh.weld import first_at_place
@@ -79,9 +82,47 @@ def inspect_surface(surface: Surface, *, self_intersections: bool = False) -> di
             for i, name in enumerate(surface.groups)
         ],
         "has_uv": surface.uv is not None,
+        "texture": _texture_facts(surface, twin),
         "has_colors": surface.colors is not None,
+        "has_normals": surface.normals is not None,
+        "materials": [
+            {
+                "name": material.name,
+                "textures": len(material.textures),
+                "has_base_texture": material.base_texture is not None,
+            }
+            for material in surface.materials
+        ],
+        "parts": [
+            {"name": part.name, "faces": faces_of}
+            for part, faces_of in zip(surface.parts, _count_parts(surface), strict=True)
+        ],
         "notes": [{"code": note.code, "count": note.count, "message": note.message} for note in notes],
     }
+
+
+def _texture_facts(surface: Surface, twin: NDArray[np.int32]) -> dict[str, Any] | None:
+    """Charts of the texture coordinates, and the seams between them: edges, length in the model's units."""
+    if surface.uv is None:
+        return None
+    seams = find_seams(surface.uv, twin)
+    once = np.flatnonzero(seams & (np.arange(len(twin)) > twin))
+    tail = surface.faces.reshape(-1)[once]
+    head = np.roll(surface.faces, -1, axis=1).reshape(-1)[once]
+    length = np.linalg.norm(surface.vertices[head] - surface.vertices[tail], axis=1)
+    return {
+        "charts": int(number_charts(surface.faces, twin, seams).max(initial=-1)) + 1,
+        "seam_edges": len(once),
+        "seam_length": float(length.sum()),
+    }
+
+
+def _count_parts(surface: Surface) -> list[int]:
+    """Faces of each part."""
+    if surface.face_part is None:
+        return [0] * len(surface.parts)
+    count: list[int] = np.bincount(surface.face_part, minlength=len(surface.parts)).tolist()
+    return count
 
 
 def _sharp_share(vertices: NDArray[np.float64], faces: NDArray[np.int32], twin: NDArray[np.int32]) -> float:

@@ -24,8 +24,9 @@ def write_mesh(
     """Write a surface to a path, in the format of its extension or the one named, or to a binary stream.
 
     OBJ keeps groups, texture coordinates and vertex colours (after the position), GLB all three (turned
-    y-up), PLY colours and groups (a face property `group`, its names in comments), STL and OFF the bare
-    triangles. A file appears only once it is whole. Raises UsageError for a format that is not written,
+    y-up), PLY colours, texture coordinates (a list `texcoord` of each face) and groups (a face property
+    `group`, its names in comments), STL and OFF the bare triangles. Shading normals are left to the reader.
+    A file appears only once it is whole. Raises UsageError for a format that is not written,
     OutputExistsError, OutputError.
     """
     writer = WRITERS[mesh_format(target, format)]
@@ -82,6 +83,7 @@ def _write_ply(stream: BinaryIO, surface: Surface) -> None:
         surface.faces,
         colors=None if surface.colors is None else color_bytes(surface.colors[:, :3]),
         face_scalars={"group": surface.face_group} if grouped else {},
+        texture=surface.uv,
         comments=[f"group {number} {name}" for number, name in enumerate(surface.groups)] if grouped else (),
     )
 
