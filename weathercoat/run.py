@@ -45,8 +45,10 @@ from weathercoat.output.folder import (
     SEVERITY,
     TIMING,
     UNTOUCHED,
+    VIEWER,
     RunFolder,
     kept_in,
+    snapshot_files,
 )
 from weathercoat.output.meshes import write_mesh
 from weathercoat.output.report import (
@@ -59,8 +61,15 @@ from weathercoat.output.report import (
     write_json,
 )
 from weathercoat.output.severity import write_table
+from weathercoat.output.snapshots import read_snapshot_ply
 from weathercoat.plan import Plan, make_plan
-from weathercoat.recording import CheckpointKeeper, SnapshotRecorder, Stopwatch, unit_color
+from weathercoat.recording import (
+    CheckpointKeeper,
+    SnapshotRecorder,
+    Stopwatch,
+    picture_parameters,
+    unit_color,
+)
 from weathercoat.resume import (
     fingerprint,
     identify,
@@ -206,6 +215,9 @@ def run_asset(
         if config.output.preview:
             with watch.time("pictures"):
                 recorder.write_preview(folder / PREVIEW)
+        if config.output.viewer:
+            with watch.time("pictures"):
+                _write_viewer(folder, config, simulation, recorder, intake.untouched)
         table = write_table(rounded(recorder.figures))
         (folder / SEVERITY).write_bytes(table.encode("utf-8", "backslashreplace"))
         if config.maps.when != "never":
@@ -224,6 +236,28 @@ def run_asset(
         )
         write_json(folder / TIMING, timing)
     return {**report, "timing": timing}
+
+
+def _write_viewer(
+    folder: Path,
+    config: Config,
+    simulation: Simulation,
+    recorder: SnapshotRecorder,
+    untouched: Surface | None,
+) -> None:
+    """Write the page that shows the run, from the snapshots as they were written."""
+    from weathercoat.output.viewer.page import write_page
+
+    with (folder / VIEWER).open("wb") as stream:
+        write_page(
+            stream,
+            [read_snapshot_ply(path) for path in snapshot_files(folder).values()],
+            rounded(recorder.figures),
+            picture_parameters(config),
+            name=simulation.surface.name,
+            up=simulation.surface.up,
+            untouched=untouched,
+        )
 
 
 def _take_in(

@@ -144,6 +144,7 @@ WITHOUT_PICTURE: dict[str, str] = {
     "checkpoint.steps": "when the state is kept",
     "checkpoint.keep": "whether the last state stays",
     "output.formats": "which files are written",
+    "output.viewer": "whether a page is written; see [viewer](viewer.md)",
     "output.preview": "whether a picture is drawn",
     "maps.when": "of baked maps; see [maps](maps.md)",
     "maps.names": "of baked maps; see [maps](maps.md)",

@@ -98,7 +98,7 @@ def command(
             snapshots,
             [rows[number] for number in wanted],
             picture_parameters(finished.config),
-            name=Path(next(iter(finished.report["inputs"]))).stem,
+            name=Path(finished.report["model"]).stem,
             up=finished.up,
             untouched=finished.untouched,
             risk=_risk(finished, snapshots, model, messages.log) if risk else None,

@@ -495,6 +495,7 @@ class Output(Section):
         ),
     ] = parameter(("ply", "glb"), "Formats of the snapshots' meshes")
     preview: Switch = parameter(True, "Whether a contact sheet of all snapshots is drawn")
+    viewer: Switch = parameter(False, "Whether a page that shows the run in a browser is written")
     picture_width: Whole = parameter(640, "Width of a picture", unit="pixels", ge=16, le=16_384)
     picture_height: Whole = parameter(480, "Height of a picture", unit="pixels", ge=16, le=16_384)
 
@@ -583,6 +584,8 @@ class Config(Section):
         if scene.pixels_per_metre is not None and (scene.distance or scene.nearest):
             found.append(("scene.pixels_per_metre", "give it or the distance of a camera, not both"))
         found += unused_values(self.physical)
+        if self.output.viewer and "ply" not in self.output.formats:
+            found.append(("output.viewer", "the page is made of snapshots in PLY; add ply to output.formats"))
         if self.maps.when != "never" and "ply" not in self.output.formats:
             found.append(("maps.when", "maps are made of snapshots in PLY; add ply to output.formats"))
         if self.quality == "auto" and self.pixels_per_unit() is None:

@@ -6,6 +6,7 @@ What lies in it:
     timing.json     seconds by stage; the only file that differs from run to run
     severity.csv    percent, sizes and grades of each snapshot, of the whole, each group and each part
     preview.png     contact sheet over time
+    view.html       a page that shows the run, where output.viewer asks for it
     snapshots/      step_0100.ply and step_0100.glb for each recorded step
     checkpoint/     what `run --resume` goes on from (see `output.checkpoints`)
     untouched.ply   the parts that carry no paint, where there are any; each GLB holds them as well
@@ -43,6 +44,7 @@ from weathercoat.sim.snapshot import Snapshot
 
 REPORT, TIMING, PREVIEW, SNAPSHOTS = "run.json", "timing.json", "preview.png", "snapshots"
 UNTOUCHED, SEVERITY, CHECKPOINT = "untouched.ply", "severity.csv", "checkpoint"
+VIEWER = "view.html"
 CHECKPOINT_STATE = f"{CHECKPOINT}/state.npz"  # there is nothing to go on from without it
 LONGEST_NAME = 255
 DEVICE_NAMES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")  # no files on Windows

@@ -31,7 +31,7 @@ from weathercoat.verification.png import check_png
 from weathercoat.verification.precision import REPORTED
 from weathercoat.verification.sheets import check_agreement, check_glb
 
-_PREVIEW, _UNTOUCHED = "preview.png", "untouched.ply"
+_PREVIEW, _UNTOUCHED, _VIEWER = "preview.png", "untouched.ply", "view.html"
 _REPORT_VERSION = 1
 _Result = TypeVar("_Result")
 
@@ -146,7 +146,8 @@ class _Run:
     def check(self) -> None:
         """Every check, into the ledger."""
         snapshots = {self._name(step, format) for step in self.steps for format in self.formats}
-        self.listing.check_names(snapshots | ({_PREVIEW} if self.has_preview else set()))
+        pages = {_VIEWER} if take(self.report, "config.output.viewer", bool, False) else set()
+        self.listing.check_names(snapshots | pages | ({_PREVIEW} if self.has_preview else set()))
         others = [name for name in self.listing.names if name not in snapshots]
         for name in others:
             if name.startswith("snapshots/"):
