@@ -11,26 +11,60 @@ import click
 
 from weathercoat.cli import options
 from weathercoat.cli.writing import STANDARD_OUTPUT, open_output, say_written
-from weathercoat.errors import UsageError
+from weathercoat.errors import UsageError, WeathercoatError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from weathercoat.finished import FinishedRun
+    from weathercoat.mesh.surface import Surface
     from weathercoat.output.camera import Camera
     from weathercoat.output.pictures import Image, PictureParameters
     from weathercoat.sim.snapshot import Snapshot
 
+_PASSES = ("beauty", "class", "depth", "normal", "instance")
 _LIGHTS = ("studio", "daylight", "overcast", "evening")
 _TURN_SECONDS = 6.0
 _SNAPSHOT_SECONDS = 0.6
+
+
+class _Step(click.ParamType):
+    """The number of a step, or the word all."""
+
+    name = "step"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
+        return "all" if value == "all" else int(click.INT.convert(value, param, ctx))
+
+
+class _Passes(click.ParamType):
+    """Names of passes with commas between them, or the word all."""
+
+    name = "passes"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        wanted = set(_PASSES) if value == "all" else set(value.split(","))
+        unknown = sorted(wanted - set(_PASSES))
+        if unknown:
+            self.fail(f"{unknown[0]!r} is none of {', '.join(_PASSES)}.", param, ctx)
+        return tuple(name for name in _PASSES if name in wanted)
 
 
 @click.command()
 @click.argument("run", type=click.Path(path_type=Path))
 @options.output("PNG or WebP; WebP, GIF or MP4 where it moves; - for standard output.", required=True)
 @click.option(
-    "--step", type=int, metavar="N", help="Draw the snapshot of this step alone, not a sheet of all."
+    "--step",
+    type=_Step(),
+    metavar="N|all",
+    help="Draw the snapshot of this step alone, not a sheet of all; with --passes the last by default.",
+)
+@click.option(
+    "--model",
+    type=click.Path(path_type=Path),
+    help="The model that the run was made of, for its textures; by default the file of its name beside RUN.",
 )
 @click.option(
     "--turntable",
@@ -64,52 +98,76 @@ _SNAPSHOT_SECONDS = 0.6
     help="grey, white, black, dark, transparent or a colour such as #203040; grey by default.",
 )
 @click.option("--ground/--no-ground", "has_ground", default=None, help="Whether a shadow falls on a ground.")
+@click.option(
+    "--passes",
+    type=_Passes(),
+    metavar="LIST",
+    help="Write a folder of labelled pictures: some of beauty,class,depth,normal,instance, or all.",
+)
+@click.option(
+    "--cameras", type=click.Path(path_type=Path), help="Their cameras, a JSON file as labels.json is one."
+)
+@click.option("--views", type=click.IntRange(1, 1_000_000), metavar="N", help="Or N sampled cameras.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the sampled cameras; 0.")
 @options.overwrite
 @options.as_json
 @options.debug
 def command(
     run: Path,
     output: Path,
-    step: int | None,
+    step: int | str | None,
+    model: Path | None,
     turntable: int | None,
     timelapse: bool,
     seconds: float | None,
     loop: bool,
     zoom: float | None,
     look_at: tuple[float, float, float] | None,
+    passes: tuple[str, ...] | None,
+    cameras: Path | None,
+    views: int | None,
+    seed: int | None,
     overwrite: bool,
     as_json: bool,
     **look: Any,
 ) -> None:
     """Draw RUN, the folder of a finished run or its folder of snapshots: a sheet of all snapshots, one of
-    them, a turn round it, or a time-lapse.
+    them, a turn round it, or a time-lapse; with --passes a folder of labelled pictures.
     """
     from weathercoat.cli.messages import Messages
     from weathercoat.run import report_compiling
 
+    changes = {name: value for name, value in look.items() if value is not None}
+    if "background" in changes:
+        changes["background"] = _background(changes["background"])
+    if passes is not None:
+        moving = {"--turntable": turntable, "--timelapse": timelapse, "--seconds": seconds}
+        _refuse({**moving, "--zoom": zoom, "--look-at": look_at}, "--passes")
+        source = _CameraSource(cameras, views, seed)
+        _label(run, output, step, model, passes, source, changes, overwrite=overwrite, as_json=as_json)
+        return
+    _refuse({"--cameras": cameras, "--views": views, "--seed": seed}, "pictures without --passes")
+    number = None if step is None or step == "all" else int(step)
     if as_json and output == STANDARD_OUTPUT:
         raise UsageError("--json and -o - both write to standard output", remedy="give a file to -o")
     moves = turntable is not None or timelapse
     if seconds is not None and not moves:
         raise UsageError("--seconds is for what moves", remedy="give --turntable or --timelapse")
-    if timelapse and step is not None:
+    if timelapse and number is not None:
         raise UsageError("--timelapse shows all snapshots, --step one", remedy="give one of them")
     kind = _kind(output, moves)
-    changes = {name: value for name, value in look.items() if value is not None}
-    if "background" in changes:
-        changes["background"] = _background(changes["background"])
     with (
         Messages(quiet=as_json) as messages,
         report_compiling(messages.log),
         open_output(output, "a picture", overwrite=overwrite) as stream,
     ):
-        stage = _stage(run, step, changes, zoom, look_at)
+        stage = _stage(_open(run, number, model, messages.log), changes, zoom, look_at)
         if moves:
             _write_moving(
                 stream, stage, kind, turntable=turntable, timelapse=timelapse, seconds=seconds, loop=loop
             )
         else:
-            _write_still(stream, stage, kind, is_sheet=step is None)
+            _write_still(stream, stage, kind, is_sheet=number is None)
     say_written(output, as_json=as_json)
 
 
@@ -147,12 +205,58 @@ def _background(text: str) -> tuple[float, float, float] | None:
     return red, green, blue
 
 
+def _refuse(given: dict[str, Any], where: str) -> None:
+    """Raise UsageError for an option that has no meaning here."""
+    for name, value in given.items():
+        if value is not None and value is not False:
+            raise UsageError(f"{name} is not for {where}", remedy="leave one of them out")
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """What is read of a run: snapshots and the parts without paint, with the materials of its model."""
+
+    finished: FinishedRun
+    snapshots: Sequence[Snapshot]
+    untouched: Surface | None
+
+
+def _open(run: Path, step: int | None, model: Path | None, log: Callable[[str], None]) -> _Opened:
+    """The snapshots of a run, or that of one step. Where the model is not there, which is said, film and
+    parts have one colour each.
+    """
+    from weathercoat.finished import open_run
+    from weathercoat.run import split_paint
+
+    finished = open_run(run)
+    snapshots = [finished.read_snapshot(number) for number in (finished.steps if step is None else [step])]
+    untouched = finished.untouched
+    surfaces = [snapshot.surface for snapshot in snapshots]
+    if untouched is None and all(surface is None or surface.face_part is None for surface in surfaces):
+        return _Opened(finished, snapshots, untouched)
+    try:
+        source = finished.read_model(model)
+    except WeathercoatError as error:
+        if model is not None:
+            raise
+        log(f"no textures: {error}")
+        return _Opened(finished, snapshots, untouched)
+    if untouched is not None:
+        untouched = split_paint(source, finished.config)[1]
+    dressed = [
+        snapshot
+        if surface is None
+        else replace(snapshot, surface=replace(surface, parts=source.parts, materials=source.materials))
+        for snapshot, surface in zip(snapshots, surfaces, strict=True)
+    ]
+    return _Opened(finished, dressed, untouched)
+
+
 @dataclass(frozen=True)
 class _Stage:
     """What is drawn: snapshots of a run, how, and from where."""
 
-    finished: FinishedRun
-    snapshots: Sequence[Snapshot]
+    opened: _Opened
     parameters: PictureParameters
     camera: Camera
     narrowed: Callable[[Camera], Camera]
@@ -164,8 +268,8 @@ class _Stage:
         return render_snapshot(
             snapshot,
             self.parameters,
-            up=self.finished.up,
-            untouched=self.finished.untouched,
+            up=self.opened.finished.up,
+            untouched=self.opened.untouched,
             camera=self.narrowed(camera),
         )
 
@@ -177,34 +281,31 @@ class _Stage:
         from weathercoat.output.display import Normalisation
         from weathercoat.output.pictures import framed_points
 
-        points, _ = framed_points(self.snapshots[0], untouched=self.finished.untouched, films=self.snapshots)
-        points = Normalisation.of(self.snapshots[0])(points)
+        points, _ = framed_points(
+            self.opened.snapshots[0], untouched=self.opened.untouched, films=self.opened.snapshots
+        )
+        points = Normalisation.of(self.opened.snapshots[0])(points)
         return turntable(
-            self.camera, points, np.asarray(self.finished.up), count, margin=self.parameters.margin
+            self.camera, points, np.asarray(self.opened.finished.up), count, margin=self.parameters.margin
         )
 
 
 def _stage(
-    run: Path,
-    step: int | None,
+    opened: _Opened,
     changes: dict[str, Any],
     zoom: float | None,
     look_at: tuple[float, float, float] | None,
 ) -> _Stage:
     import numpy as np
 
-    from weathercoat.finished import open_run
     from weathercoat.output.camera import zoomed
     from weathercoat.output.display import Normalisation
     from weathercoat.output.pictures import frame_camera
     from weathercoat.recording import picture_parameters
 
-    finished = open_run(run)
-    snapshots = [finished.read_snapshot(number) for number in (finished.steps if step is None else [step])]
-    parameters = replace(picture_parameters(finished.config), **changes)
-    camera = frame_camera(
-        snapshots[0], parameters, up=finished.up, untouched=finished.untouched, films=snapshots
-    )
+    snapshots, up = opened.snapshots, opened.finished.up
+    parameters = replace(picture_parameters(opened.finished.config), **changes)
+    camera = frame_camera(snapshots[0], parameters, up=up, untouched=opened.untouched, films=snapshots)
     centre: np.ndarray[Any, Any] | None = None
     if look_at is not None:
         centre = Normalisation.of(snapshots[0])(np.array([look_at]))[0]
@@ -212,17 +313,17 @@ def _stage(
     def narrowed(camera: Camera) -> Camera:
         return zoomed(camera, zoom or 1.0, centre)
 
-    return _Stage(finished, snapshots, parameters, camera, narrowed)
+    return _Stage(opened, parameters, camera, narrowed)
 
 
 def _write_still(stream: BinaryIO, stage: _Stage, kind: str, *, is_sheet: bool) -> None:
     from weathercoat.output.animation import write_animation
     from weathercoat.output.pictures import contact_sheet, write_png
 
-    images = [stage.draw(snapshot, stage.camera) for snapshot in stage.snapshots]
+    images = [stage.draw(snapshot, stage.camera) for snapshot in stage.opened.snapshots]
     image = images[0]
     if is_sheet:
-        image = contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in stage.snapshots])
+        image = contact_sheet(images, [f"age {snapshot.age:g}" for snapshot in stage.opened.snapshots])
     if kind == ".png":
         write_png(stream, image)
     else:
@@ -241,7 +342,7 @@ def _write_moving(
 ) -> None:
     from weathercoat.output.animation import write_animation
 
-    snapshots = stage.snapshots if timelapse else stage.snapshots[-1:]
+    snapshots = stage.opened.snapshots if timelapse else stage.opened.snapshots[-1:]
     if turntable is None:
         cameras, whole = [stage.camera] * len(snapshots), _SNAPSHOT_SECONDS * len(snapshots)
     else:
@@ -251,3 +352,77 @@ def _write_moving(
         stage.draw(snapshots[index * len(snapshots) // count], camera) for index, camera in enumerate(cameras)
     ]
     write_animation(stream, images, kind, [(seconds or whole) / count] * count, loop=loop)
+
+
+@dataclass(frozen=True)
+class _CameraSource:
+    """Where the cameras of labelled pictures come from: a file, or a number of sampled ones."""
+
+    file: Path | None
+    count: int | None
+    seed: int | None
+
+    def __post_init__(self) -> None:
+        if (self.file is None) == (self.count is None):
+            raise UsageError("--passes needs --cameras or --views, and not both", remedy="give one of them")
+        if self.file is not None and self.seed is not None:
+            raise UsageError("--seed is for sampled cameras", remedy="give --views instead of --cameras")
+
+
+def _label(
+    run: Path,
+    output: Path,
+    step: int | str | None,
+    model: Path | None,
+    passes: tuple[str, ...],
+    source: _CameraSource,
+    changes: dict[str, Any],
+    *,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Write labelled pictures into the folder `output`."""
+    import numpy as np
+
+    from weathercoat.cli.messages import Messages
+    from weathercoat.finished import open_run
+    from weathercoat.output.folder import RunFolder
+    from weathercoat.output.labels.cameras import read_views
+    from weathercoat.output.labels.dataset import LABELS, LabelledRun, LabelRequest, write_labels
+    from weathercoat.recording import picture_parameters
+    from weathercoat.run import report_compiling
+
+    if output == STANDARD_OUTPUT:
+        raise UsageError("--passes writes a folder, not standard output", remedy="name one with -o")
+    with Messages(quiet=as_json) as messages, report_compiling(messages.log):
+        finished = open_run(run)
+        wanted = None if step == "all" else (finished.steps[-1] if step is None else int(step))
+        opened = _open(run, wanted, model, messages.log)
+        parameters = replace(picture_parameters(finished.config), **changes)
+        size = parameters.width, parameters.height
+        request = LabelRequest(
+            passes,
+            () if source.file is None else read_views(source.file, np.array(finished.up), *size),
+            source.count or 0,
+            source.seed or 0,
+            *size,
+        )
+        report = finished.report
+        about = {
+            "name": finished.path.resolve().name,
+            "fingerprint": report["fingerprint"],
+            "seed": report["seed"],
+            "inputs": report["inputs"],
+            "config": report["config"],
+        }
+        severity = {int(row["step"]): row["severity"] for row in report["snapshots"] if "severity" in row}
+        with RunFolder(output, overwrite=overwrite, marker=LABELS) as folder:
+            count = write_labels(
+                folder,
+                opened.snapshots,
+                LabelledRun(about, finished.up, opened.untouched, severity),
+                parameters,
+                request,
+                messages.progress,
+            )
+    say_written(output, f"{count} pictures of {', '.join(passes)}", as_json=as_json)

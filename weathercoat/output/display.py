@@ -58,7 +58,8 @@ class DisplayMesh:
     rest (k, 3), the position at rest; stain, dust, rust (k,), 0 to 1: runoff rust on the film, dust, rust of
     the metal; layer (k,), 1 on the film's front and 0 on its back; color (k, 3), linear colour of the paint
     or, under a material, what multiplies its colour. material int32 (t,): what a face shows of `materials`,
-    -1 for none; uv float32 (t, 3, 2), texture coordinates of the corners, v upwards.
+    -1 for none; uv float32 (t, 3, 2), texture coordinates of the corners, v upwards. source int32 (t,): the
+    face of the snapshot's metal or film, or of the part without paint, that it shows.
     """
 
     vertices: Vectors
@@ -73,6 +74,7 @@ class DisplayMesh:
     color: Vectors
     material: Indices
     uv: NDArray[np.float32]
+    source: Indices
     materials: tuple[Material, ...] = ()
 
     def at(self, face: Indices, weights: NDArray[np.float32]) -> Samples:
@@ -190,6 +192,7 @@ def _part(
         color=given.get("color", np.zeros((len(vertices), 3))),
         material=np.full(len(everything), -1, np.int32),
         uv=np.zeros((len(everything), 3, 2), np.float32),
+        source=np.arange(len(everything), dtype=np.int32),
     )
 
 
@@ -203,7 +206,14 @@ def _metal(snapshot: Snapshot, rest: Vectors, thickness: float) -> DisplayMesh:
     doubled = {name: np.concatenate([value, value]) for name, value in scalars.items()}
     doubled["rest"] = shell.vertices
     everything = np.concatenate([shell.front, shell.back, shell.rim])
-    return _part(shell.vertices, ((everything, METAL),), _METAL_CREASE, doubled)
+    sheet = _part(shell.vertices, ((everything, METAL),), _METAL_CREASE, doubled)
+    return replace(sheet, source=_sources(shell))
+
+
+def _sources(shell: Shell) -> Indices:
+    """The face of the sheet that each face of its shell's front, back and rim belongs to."""
+    own = np.arange(len(shell.front), dtype=np.int32)
+    return np.concatenate([own, own, shell.rim_face])
 
 
 def _film(
@@ -228,7 +238,7 @@ def _film(
         "color": np.tile(color, (2, 1)),
     }
     surfaces = ((shell.front, FRONT), (shell.back, BACK), (shell.rim, RIM))
-    film = _part(shell.vertices, surfaces, _FILM_CREASE, scalars)
+    film = replace(_part(shell.vertices, surfaces, _FILM_CREASE, scalars), source=_sources(shell))
     return _with_look(film, snapshot, shell, look)
 
 
@@ -310,6 +320,7 @@ def make_part_mesh(vertices: Vectors, surface: Surface) -> DisplayMesh:
         materials=materials,
         uv=uv,
         corner_normals=normals,
+        source=order.astype(np.int32),
     )
 
 
@@ -342,7 +353,19 @@ def join_meshes(parts: Sequence[DisplayMesh]) -> DisplayMesh:
     def all_of(name: str) -> NDArray[np.generic]:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    names = ("vertices", "kind", "corner_normals", "rest", "stain", "dust", "rust", "layer", "color", "uv")
+    names = (
+        "vertices",
+        "kind",
+        "corner_normals",
+        "rest",
+        "stain",
+        "dust",
+        "rust",
+        "layer",
+        "color",
+        "uv",
+        "source",
+    )
     starts = np.cumsum([0] + [len(part.materials) for part in parts])
     material = [
         np.where(part.material >= 0, part.material + np.int32(start), part.material)

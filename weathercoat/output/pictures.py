@@ -148,20 +148,30 @@ def render_snapshot(
     in its units; camera: one of `frame_camera`, which is also the default.
     """
     camera = camera or frame_camera(snapshot, parameters, up=up, untouched=untouched)
-    normalise = Normalisation.of(snapshot)
-    mesh = make_display_mesh(
+    mesh = display_snapshot(snapshot, parameters, untouched=untouched)
+    return render_mesh(mesh, camera, parameters, up=up, ground=ground_of(snapshot, parameters, up))
+
+
+def display_snapshot(
+    snapshot: Snapshot, parameters: PictureParameters, *, untouched: Surface | None = None
+) -> DisplayMesh:
+    """What pictures of a snapshot show."""
+    return make_display_mesh(
         snapshot,
-        normalise,
+        Normalisation.of(snapshot),
         film_thickness=parameters.film_thickness,
         metal_thickness=parameters.metal_thickness,
         paint=to_linear(parameters.paint),
         untouched=untouched,
         look=parameters.look,
     )
-    placed = normalise(snapshot.substrate_vertices)
+
+
+def ground_of(snapshot: Snapshot, parameters: PictureParameters, up: Axis) -> tuple[float, float]:
+    """The ground under a snapshot's substrate; see `render_mesh`."""
+    placed = Normalisation.of(snapshot)(snapshot.substrate_vertices)
     level = float((placed @ np.asarray(up, np.float64)).min()) - parameters.metal_thickness
-    radius = 1.6 * float(np.linalg.norm(placed, axis=1).max())
-    return render_mesh(mesh, camera, parameters, up=up, ground=(level, radius))
+    return level, 1.6 * float(np.linalg.norm(placed, axis=1).max())
 
 
 def render_mesh(
