@@ -122,7 +122,7 @@ def test_usd_read_back_and_checked_by_usd(tmp_path):
 
 
 def test_coarser_levels_keep_the_share_of_separated_film():
-    pytest.importorskip("fast_simplification")
+    pytest.importorskip("pyfqmr")
     from weathercoat.output.lods import coarser
 
     snapshot = textured_snapshot(cells=16)
@@ -133,6 +133,26 @@ def test_coarser_levels_keep_the_share_of_separated_film():
     share = (coarse * film.separated[film.film_faces].mean(axis=1)).sum() / coarse.sum()
     fine = (area * snapshot.separated[snapshot.film_faces].mean(axis=1)).sum() / area.sum()
     assert share == pytest.approx(fine, abs=0.05)
+
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_coarser_levels_keep_area_outline_and_mean_rust(level: int):
+    """Open edges stay, so no film is lost where the surface is flat, and means by area stay with it."""
+    pytest.importorskip("pyfqmr")
+    from weathercoat.output.lods import coarser
+
+    snapshot = textured_snapshot(cells=24)
+    film, metal = coarser(snapshot, level)
+    area = face_areas(snapshot.film_vertices, snapshot.film_faces)
+    coarse = face_areas(film.film_vertices, film.film_faces)
+    assert coarse.sum() == pytest.approx(area.sum(), rel=0.01)
+    mean = np.average(snapshot.film_rust[snapshot.film_faces].mean(axis=1), weights=area)
+    kept = np.average(film.film_rust[film.film_faces].mean(axis=1), weights=coarse)
+    assert kept == pytest.approx(mean, abs=0.02)
+    metal_area = face_areas(metal.substrate_vertices, metal.substrate_faces).sum()
+    before = face_areas(snapshot.substrate_vertices, snapshot.substrate_faces).sum()
+    assert metal_area == pytest.approx(before, rel=0.01)
+    assert len(metal.substrate_faces) < 0.5 * len(snapshot.substrate_faces)
 
 
 def test_film_behind_a_crack_is_one_piece():
