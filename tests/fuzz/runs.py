@@ -109,7 +109,7 @@ def make_case(seed: int, number: int) -> Case:
     values: dict[str, Any] = {}
     for parameter in parameters():
         key = parameter.key
-        if key in _LEFT or key.startswith("scene.") or random.random() > often:
+        if key in _LEFT or key.startswith(("scene.", "physical.", "maps.")) or random.random() > often:
             continue
         values[key] = valid_value(parameter, random)
     values |= {key: one(list(choices)) for key, choices in _WORK.items()}

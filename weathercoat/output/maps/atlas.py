@@ -20,7 +20,9 @@ def make_atlas(surface: Surface, *, size: int, padding: int) -> Surface:
     import xatlas
 
     atlas = xatlas.Atlas()
-    atlas.add_mesh(surface.vertices.astype(np.float32), surface.faces.astype(np.uint32))
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+    points = (surface.vertices - 0.5 * (low + high)) / (high - low).max()  # for its single precision
+    atlas.add_mesh(points.astype(np.float32), surface.faces.astype(np.uint32))
     pack = xatlas.PackOptions()
     pack.resolution, pack.padding = size, padding
     pack.rotate_charts = False  # it turns charts by exchanging u and v, and so mirrors them
