@@ -443,6 +443,41 @@ def test_a_small_run_from_file_to_folder(capsys: pytest.CaptureFixture[str]) -> 
     assert Path("one.png").read_bytes().startswith(b"\x89PNG")
     assert call(["render", "out/snapshots", "-o", "two.png", "--step", "31"]) == 2
     assert "there are 6, 12, 18, 24, 30" in capsys.readouterr().err
+    small = ["--width", "40", "--height", "30"]
+    for name, more in (
+        ("turn.webp", ["--turntable", "3"]),
+        ("ages.gif", ["--timelapse", "--seconds", "1"]),
+        ("both.webp", ["--turntable", "4", "--timelapse", "--no-loop"]),
+        ("clear.png", ["--step", "30", "--background", "transparent", "--no-ground", "--zoom", "2"]),
+        (
+            "lit.png",
+            ["--step", "30", "--background", "#203040", "--light", "overcast", "--look-at", "0", "0", "0"],
+        ),
+    ):
+        assert call(["render", "out", "-o", name, *small, *more]) == 0
+        assert Path(name).stat().st_size > 100
+    for more, message in (
+        (["-o", "a.gif"], "no format for a still"),
+        (["-o", "a.png", "--timelapse"], "no format for what moves"),
+        (["-o", "a.png", "--background", "sky"], "is no colour"),
+        (["-o", "a.png", "--seconds", "2"], "--seconds is for what moves"),
+        (["-o", "a.webp", "--timelapse", "--step", "6"], "give one of them"),
+        (["-o", "a.png", "--views", "2"], "--views is not for"),
+        (["-o", "set", "--passes", "class"], "needs --cameras or --views"),
+        (["-o", "set", "--passes", "class", "--views", "1", "--zoom", "2"], "--zoom is not for"),
+        (["-o", "-", "--passes", "class", "--views", "1"], "writes a folder"),
+        (["-o", "set", "--passes", "colour", "--views", "1"], "is none of beauty"),
+    ):
+        assert call(["render", "out", *more]) == 2
+        assert message in capsys.readouterr().err
+    labels = ["render", "out", "-o", "set", "--passes", "all", "--views", "2", "--step", "all", *small]
+    assert call(labels) == 0
+    content = json.loads(Path("set/labels.json").read_text())
+    assert len(content["images"]) == 10 and content["run"]["fingerprint"] == report["fingerprint"]
+    assert call(labels) == 7
+    again = ["--passes", "class", "--cameras", "set/labels.json", *small]
+    assert call(["render", "out", "-o", "again", *again]) == 0
+    assert len(list(Path("again/class").iterdir())) == 2
 
 
 @pytest.mark.long
