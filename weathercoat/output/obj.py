@@ -27,7 +27,8 @@ def write_obj(path: Path, nodes: Sequence[Node]) -> None:
     """
     library = path.with_suffix(".mtl")
     materials: list[Material] = []
-    vertex = texture = 1
+    has_uv = any(sheet.uv is not None for node in nodes for sheet in node.sheets)
+    vertex = 1
     with path.open("wb") as stream:
         stream.write(f"mtllib {library.name}\n".encode())
         for node in nodes:
@@ -39,30 +40,31 @@ def write_obj(path: Path, nodes: Sequence[Node]) -> None:
                     materials.append(sheet.material)
                 name = _names(materials)[materials.index(sheet.material)]
                 stream.write(f"usemtl {name}\n".encode("utf-8", "replace"))
-                _write_sheet(stream, sheet, vertex, texture)
+                _write_sheet(stream, sheet, vertex, has_uv=has_uv)
                 vertex += len(sheet.vertices)
-                texture += 0 if sheet.uv is None else len(sheet.vertices)
     pictures = PictureFolder(path.parent)
     with library.open("w", encoding="utf-8", errors="replace") as file:
         for name, material in zip(_names(materials), materials, strict=True):
             file.writelines(f"{line}\n" for line in _material(name, material, pictures))
 
 
-def _write_sheet(stream: BinaryIO, sheet: Sheet, vertex: int, texture: int) -> None:
-    """A sheet whose first vertex and texture coordinate have these numbers."""
+def _write_sheet(stream: BinaryIO, sheet: Sheet, vertex: int, *, has_uv: bool) -> None:
+    """A sheet whose first vertex has this number. Where others have texture coordinates, it has as many as
+    vertices as well, since some readers ask for that.
+    """
     columns = [sheet.vertices]
     if sheet.colors is not None:
         columns.append(to_srgb(sheet.colors) / 255.0)
     stream.writelines(text_lines("v" + " %r" * (3 * len(columns)) + "\n", np.hstack(columns)))
     stream.writelines(text_lines("vn %.6f %.6f %.6f\n", sheet.normals))
-    corner = sheet.faces.astype(np.int64)
-    if sheet.uv is None:
-        indices, row = [corner + vertex, corner + vertex], "f" + " %d//%d" * 3 + "\n"
-    else:
-        stream.writelines(text_lines("vt %r %r\n", sheet.uv))
-        indices = [corner + vertex, corner + texture, corner + vertex]
+    row = "f" + " %d//%d" * 3 + "\n"
+    if has_uv:
+        uv = np.zeros((len(sheet.vertices), 2)) if sheet.uv is None else sheet.uv
+        stream.writelines(text_lines("vt %r %r\n", uv))
         row = "f" + " %d/%d/%d" * 3 + "\n"
-    stream.writelines(text_lines(row, np.stack(indices, axis=2).reshape(len(corner), -1)))
+    corner = sheet.faces.astype(np.int64) + vertex
+    indices = np.repeat(corner.reshape(-1, 1), 3 if has_uv else 2, axis=1)
+    stream.writelines(text_lines(row, indices.reshape(len(corner), -1)))
 
 
 def _names(materials: Sequence[Material]) -> list[str]:
