@@ -13,6 +13,8 @@ from weathercoat.mesh.surface import Surface, Vectors, vertex_normals
 from weathercoat.output.camera import Camera, make_camera
 from weathercoat.output.display import Normalisation
 from weathercoat.output.glb import Material, Node, write_glb
+from weathercoat.output.maps.padding import find_padding
+from weathercoat.output.maps.raster import rasterise, texel_corners
 from weathercoat.output.ply import color_bytes, write_ply
 from weathercoat.output.rays import make_rays
 from weathercoat.output.report import write_json
@@ -20,6 +22,8 @@ from weathercoat.output.sheets import METAL_CREASE, make_sheet, srgb_to_linear
 from weathercoat.sim.risk import ATTACHED, BARE, NEVER, SEPARATED, Risk
 
 PLY, GLB, PICTURE, SUMMARY = "risk.ply", "risk.glb", "risk.png", "risk.json"
+MAP = "risk_map.png"  # where the model has texture coordinates
+_PADDING = 8  # texels
 SHOWN = ("separation", "fracture")
 
 Image = NDArray[np.uint8]
@@ -62,7 +66,8 @@ def _scale(value: Vectors) -> Vectors:
 
 
 def write_risk(folder: Path, surface: Surface, risk: Risk, *, shown: str = "separation") -> dict[str, Any]:
-    """Write a PLY and a GLB with the scalars of `Risk.scalars`, a picture and a summary, which is returned.
+    """Write a PLY and a GLB with the scalars of `Risk.scalars`, a picture, a map where there are texture
+    coordinates, and a summary, which is returned.
 
     surface: that of the simulation; shown: which of `SHOWN` the vertex colours of the meshes are. In PLY and
     GLB what is not within the horizon is -1, and ratios end at 1,000. Raises OSError.
@@ -93,8 +98,30 @@ def write_risk(folder: Path, surface: Surface, risk: Risk, *, shown: str = "sepa
     from weathercoat.output.pictures import write_png
 
     write_png(folder / PICTURE, draw_risk(surface, risk))
+    if surface.uv is not None:
+        write_png(folder / MAP, draw_risk_map(surface, surface.uv, colors))
     write_json(folder / SUMMARY, about)
     return about
+
+
+def draw_risk_map(surface: Surface, uv: Vectors, colors: Vectors, size: int = 1024) -> Image:
+    """Colours of the vertices (n0, 3), 0 to 1, on the texture coordinates (m, 3, 2), v upwards, uint8 (size,
+    size, 3). Coordinates beyond the first tile come back into it; where several faces claim a texel the first
+    one shows.
+    """
+    tile = np.floor(uv.mean(axis=1, keepdims=True))
+    face = np.full((size, size), -1, np.int32)
+    weights, again = np.zeros((size, size, 2), np.float32), np.zeros((size, size), np.uint8)
+    rasterise(texel_corners(uv - tile, size, size), 0, face, weights, again)
+    source = np.empty_like(face)
+    find_padding(face, _PADDING, source)
+    shown = np.flatnonzero(source.ravel() >= 0)
+    texel = source.ravel()[shown]
+    corners = colors[surface.faces[face.ravel()[texel]]]
+    second, third = weights.reshape(-1, 2)[texel].T.astype(np.float64)[:, :, None]
+    picture = np.full((size * size, 3), _PAPER / 255.0)
+    picture[shown] = (1.0 - second - third) * corners[:, 0] + second * corners[:, 1] + third * corners[:, 2]
+    return color_bytes(picture).reshape(size, size, 3)
 
 
 def summarise(surface: Surface, risk: Risk) -> dict[str, Any]:
