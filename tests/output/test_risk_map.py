@@ -9,7 +9,7 @@ from weathercoat.output.risk import draw_risk_map
 
 
 def test_a_map_shows_each_vertex_where_its_texture_is() -> None:
-    """The texture of one side of a plate is its place, so the picture is the colours as a function of that."""
+    """The texture of a plate is its place, so the picture is the colours as a function of that."""
     plate = make_plate(width=1.0, height=1.0)
     corner = plate.vertices[plate.faces]
     axes = np.argsort(np.ptp(plate.vertices, axis=0))[1:]
