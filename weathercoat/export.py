@@ -18,7 +18,7 @@ from weathercoat.output.glb_series import Moment, write_glb_series
 from weathercoat.output.lods import coarser, require_lods
 from weathercoat.output.obj import write_obj
 from weathercoat.output.parts import part_sheets, write_parts_glb
-from weathercoat.output.pieces import number_pieces, rest_centers
+from weathercoat.output.pieces import number_flakes, rest_centers
 from weathercoat.output.sheets import surface_nodes
 from weathercoat.output.snapshots import Look, film_sheets, metal_sheets, write_snapshot_ply
 from weathercoat.output.usd import Frame, require_usd, write_usd
@@ -141,7 +141,7 @@ class _Exporter:
 
     def _film(self, film: Snapshot) -> tuple[list[Sheet], int]:
         """The sheets of the film, and the number of its flakes."""
-        pieces = number_pieces(film) if self.wanted.flakes else None
+        pieces = number_flakes(film) if self.wanted.flakes else None
         sheets = film_sheets(film, self.thickness, self.back, self.look, pieces)
         return sheets, 0 if pieces is None or not len(pieces) else int(pieces.max())
 
@@ -151,7 +151,7 @@ class _Exporter:
         own: dict[int, list[Sheet]] = {}
         for sheet in sheets:
             own.setdefault(sheet.piece, []).append(sheet)
-        centers = rest_centers(film, number_pieces(film))
+        centers = rest_centers(film, number_flakes(film))
         digits = max(4, len(str(count)))
         return [
             Node(f"flake_{number:0{digits}}", own[number], pivot=centers[number - 1])

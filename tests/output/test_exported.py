@@ -9,9 +9,10 @@ import trimesh
 
 from tests.output.snapshots import make_snapshot
 from weathercoat.mesh.surface import face_areas, make_surface
+from weathercoat.output.condition import LIFTED, film_classes
 from weathercoat.output.glb import Node
 from weathercoat.output.obj import write_obj
-from weathercoat.output.pieces import number_pieces
+from weathercoat.output.pieces import number_flakes
 from weathercoat.output.ply import color_bytes
 from weathercoat.output.sheets import srgb_to_linear
 from weathercoat.output.snapshots import film_sheets, metal_sheets
@@ -157,8 +158,6 @@ def test_coarser_levels_keep_area_outline_and_mean_rust(level: int):
 
 def test_film_behind_a_crack_is_one_piece():
     snapshot = make_snapshot(split_column=2)
-    pieces = number_pieces(snapshot)
-    loose = snapshot.separated[snapshot.film_faces].all(axis=1)
-    assert loose.any()
-    assert np.array_equal(pieces > 0, loose)
-    assert pieces.max() == 1
+    flakes = number_flakes(snapshot)
+    assert np.array_equal(flakes > 0, film_classes(snapshot) == LIFTED)
+    assert flakes.max() == 1

@@ -1,30 +1,36 @@
-"""Loose pieces of film: what has let go of the metal and hangs together."""
+"""Loose pieces of film, and other stretches of faces that hang together."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weathercoat.mesh.pairing import pair_half_edges
 from weathercoat.mesh.surface import Indices, Vectors, face_areas
 from weathercoat.mesh.topology import number_components
+from weathercoat.output.condition import LIFTED, film_classes
 from weathercoat.sim.snapshot import Snapshot
 
 
-def number_pieces(snapshot: Snapshot) -> Indices:
-    """The piece of each face of the film, int32 (m,): from 1 in the order of their first faces, and 0 for
-    film that holds.
+def number_flakes(snapshot: Snapshot) -> Indices:
+    """The flake of each face of the film, int32 (m,), as `number_pieces` numbers lifted film.
 
-    A face is loose when all its corners have let go; loose faces across an unbroken edge are one piece, so a
-    flap that still hangs on the film beside it is a piece as well, up to that film.
+    Lifted faces across an unbroken edge are one flake, so a flap that still hangs on the film beside it is
+    one as well, up to that film.
     """
-    faces = snapshot.film_faces
+    return number_pieces(snapshot.film_faces, film_classes(snapshot) == LIFTED)
+
+
+def number_pieces(faces: Indices, chosen: NDArray[np.bool_]) -> Indices:
+    """The number of the piece, from 1 in the order of their first faces, that each of the `chosen` faces (m,)
+    belongs to, int32 (m,), 0 for the others. Faces that share an edge are one piece.
+    """
     number = np.zeros(len(faces), np.int32)
-    loose = np.flatnonzero(snapshot.separated[faces].all(axis=1))
-    if len(loose) == 0:
-        return number
-    own = np.ascontiguousarray(faces[loose])
-    twin, _, _ = pair_half_edges(own, len(snapshot.film_vertices))
-    number[loose] = number_components(own, twin) + 1
+    own = np.flatnonzero(chosen)
+    if len(own):
+        triangles = np.ascontiguousarray(faces[own], np.int32)
+        twin, _, _ = pair_half_edges(triangles, int(faces.max()) + 1)
+        number[own] = number_components(triangles, twin) + 1
     return number
 
 

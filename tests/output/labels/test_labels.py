@@ -25,8 +25,9 @@ from weathercoat.output.labels.dataset import (
     annotate,
     write_labels,
 )
-from weathercoat.output.labels.passes import NAMES, number_pieces
+from weathercoat.output.labels.passes import NAMES
 from weathercoat.output.pictures import PictureParameters
+from weathercoat.output.pieces import number_pieces
 from weathercoat.sim.snapshot import Snapshot
 
 PARAMETERS = PictureParameters(film_thickness=0.0, metal_thickness=0.0)

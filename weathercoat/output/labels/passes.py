@@ -12,6 +12,7 @@ from weathercoat.mesh.surface import Indices, Vectors, face_areas
 from weathercoat.output.camera import Camera
 from weathercoat.output.condition import BARE, CLASSES, LIFTED, RUST, film_classes, metal_classes
 from weathercoat.output.display import DisplayMesh, Normalisation
+from weathercoat.output.pieces import number_flakes, number_pieces
 from weathercoat.output.rays import RayQueries
 from weathercoat.output.shading import BACK, BARE_PART, METAL, OWN_PART
 from weathercoat.sim.snapshot import Snapshot
@@ -56,7 +57,7 @@ class FaceLabels:
 def label_faces(snapshot: Snapshot) -> FaceLabels:
     """The labels of all faces of a snapshot. Raises LimitError for more instances than can be numbered."""
     film, metal = film_classes(snapshot), metal_classes(snapshot)
-    flake = number_pieces(snapshot.film_faces, film == LIFTED)
+    flake = number_flakes(snapshot)
     patch = number_pieces(snapshot.substrate_faces, (metal == BARE) | (metal == RUST))
     flakes = int(flake.max(initial=0))
     if flakes + int(patch.max(initial=0)) > _MOST_INSTANCES:
@@ -72,31 +73,6 @@ def label_faces(snapshot: Snapshot) -> FaceLabels:
         patch=np.where(patch > 0, patch + np.int32(flakes), 0).astype(np.int32),
         shares={name: float(share) for name, share in zip(CLASSES, by_class, strict=True)},
     )
-
-
-def number_pieces(faces: Indices, chosen: NDArray[np.bool_]) -> Indices:
-    """The number of the piece, from 1 in the order of their first faces, that each of the `chosen` faces (m,)
-    belongs to, int32 (m,), 0 for the others. Faces that share an edge are one piece.
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    result = np.zeros(len(faces), np.int32)
-    inner = np.flatnonzero(chosen)
-    if len(inner) == 0:
-        return result
-    tails, heads = faces[inner].ravel().astype(np.int64), np.roll(faces[inner], -1, axis=1).ravel()
-    key = np.minimum(tails, heads) * (int(faces.max()) + 1) + np.maximum(tails, heads)
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    a, b = order[same] // 3, order[same + 1] // 3
-    graph = coo_matrix((np.ones(len(a), np.bool_), (a, b)), shape=(len(inner), len(inner)))
-    piece = connected_components(graph, directed=False)[1]
-    _, first = np.unique(piece, return_index=True)
-    rank = np.empty(len(first), np.int32)
-    rank[np.argsort(first)] = np.arange(1, len(first) + 1, dtype=np.int32)
-    result[inner] = rank[piece]
-    return result
 
 
 @dataclass(frozen=True)
