@@ -5,7 +5,7 @@ USD.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -121,11 +121,7 @@ class _Exporter:
             yield Frame(number * self.wanted.seconds, [*self._nodes(snapshot, snapshot), *self._still()])
 
     def _read(self, step: int) -> Snapshot:
-        snapshot, model = self.run.read_snapshot(step), self.wanted.model
-        if model is None or snapshot.surface is None:
-            return snapshot
-        own = replace(snapshot.surface, parts=model.parts, materials=model.materials, tree=model.tree)
-        return replace(snapshot, surface=replace(own, up=model.up, name=model.name))
+        return self.run.read_snapshots([step], self.wanted.model)[0]
 
     def _still(self) -> list[Node]:
         untouched = self.run.untouched

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,13 @@ class FinishedRun:
             )
         return read_snapshot_ply(files[wanted])
 
+    def read_snapshots(self, steps: Sequence[int], model: Surface | None) -> list[Snapshot]:
+        """The snapshots of steps, with the materials of the run's model, where that is given."""
+        snapshots = [self.read_snapshot(step) for step in steps]
+        if model is None:
+            return snapshots
+        return [with_materials(snapshot, model) for snapshot in snapshots]
+
     def find_model(self, model: Path | None = None) -> Surface | None:
         """As `read_model`, but None where no model is given and none is found."""
         if model is not None:
@@ -102,6 +110,14 @@ class FinishedRun:
                 f"is not the model of the run {self.path}, which was made of {name}", file=name_of(place)
             )
         return read_surface(place, up=self.config.model.up)
+
+
+def with_materials(snapshot: Snapshot, model: Surface) -> Snapshot:
+    """A snapshot that was read, with the parts and materials of the model that it is of."""
+    if snapshot.surface is None:
+        return snapshot
+    own = replace(snapshot.surface, parts=model.parts, materials=model.materials, tree=model.tree)
+    return replace(snapshot, surface=replace(own, up=model.up, name=model.name))
 
 
 def open_run(path: Path | str) -> FinishedRun:

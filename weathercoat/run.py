@@ -29,6 +29,7 @@ from weathercoat.errors import (
     printable,
 )
 from weathercoat.film.state import FilmParameters
+from weathercoat.finished import with_materials
 from weathercoat.lock import LOCK
 from weathercoat.masks.evaluate import make_changes, require_masks
 from weathercoat.masks.files import NO_MASKS, MaskSource, hash_masks, mask_source
@@ -251,7 +252,10 @@ def _write_viewer(
     with (folder / VIEWER).open("wb") as stream:
         write_page(
             stream,
-            [read_snapshot_ply(path) for path in snapshot_files(folder).values()],
+            [
+                with_materials(read_snapshot_ply(path), simulation.surface)
+                for path in snapshot_files(folder).values()
+            ],
             rounded(recorder.figures),
             picture_parameters(config),
             name=simulation.surface.name,

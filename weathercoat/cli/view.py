@@ -92,7 +92,7 @@ def command(
         finished = open_run(run)
         wanted = _wanted(finished, steps, step, before, after)
         rows = {int(row["step"]): row for row in finished.report["snapshots"]}
-        snapshots = [finished.read_snapshot(number) for number in wanted]
+        snapshots = finished.read_snapshots(wanted, finished.find_model(model))
         write_page(
             stream,
             snapshots,

@@ -515,6 +515,7 @@ async function begin() {
   readAddress();
   document.body.classList.toggle("bare", state.bare);
   await model.begin();
+  uniforms.hasBase.value = model.baseColors !== null;
   if (model.untouched) turned.add(model.untouched);
   const places = new Float32Array(model.base.points);
   const point = new Vector3();

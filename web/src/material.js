@@ -10,6 +10,8 @@ attribute vec3 rest;
 attribute vec4 state; // stain or rust, dirt, rust of the metal, layer
 attribute vec4 figures; // adhesion, strain, risk, openness
 attribute float kind;
+attribute vec3 base; // sRGB, of a film that shows the model's own materials
+varying vec3 vBase;
 varying vec3 vRest;
 varying vec4 vState;
 varying vec4 vFigures;
@@ -25,7 +27,8 @@ uniform vec3 paint;
 uniform vec3 fallLine;
 uniform vec4 stateShare, figureShare; // which scalar the overlay shows; all 0 for none
 uniform float overlay, exposure;
-uniform bool filmShown;
+uniform bool filmShown, hasBase;
+varying vec3 vBase;
 uniform mat3 normalMatrix;
 varying vec3 vRest;
 varying vec4 vState;
@@ -76,6 +79,10 @@ float rustLayer(float amount, inout vec3 albedo) {
   return cover;
 }
 
+vec3 linearOf(vec3 color) {
+  return mix(color / 12.92, pow((color + 0.055) / 1.055, vec3(2.4)), step(0.04045, color));
+}
+
 vec3 paintFilm(vec3 color) {
   vec4 cloud = fractal(vRest, 6.0, 4);
   vec3 albedo = color * (0.84 + 0.32 * cloud.w);
@@ -108,7 +115,7 @@ vec3 surfaceColor(vec3 own) {
   wcGloss = 1.0;
   vec3 albedo;
   if (vKind < 0.5 || (vKind > 1.5 && vKind < 2.5 && vState.w > 0.6)) {
-    return paintFilm(paint);
+    return paintFilm(hasBase ? linearOf(vBase) : paint);
   } else if (vKind < 2.5) {
     float value = fractal(vRest, 30.0, 3).w;
     albedo = palette[0] * (0.82 + 0.3 * value);
@@ -158,6 +165,7 @@ export function makeMaterial(noiseMap, about) {
     overlay: { value: 0 },
     exposure: { value: 1 },
     filmShown: { value: true },
+    hasBase: { value: false },
   };
   const material = new MeshStandardMaterial({ side: DoubleSide, vertexColors: false });
   material.onBeforeCompile = (shader) => {
@@ -166,7 +174,7 @@ export function makeMaterial(noiseMap, about) {
       VERTEX_HEAD +
       shader.vertexShader.replace(
         "#include <begin_vertex>",
-        "#include <begin_vertex>\nvRest = rest; vState = state; vFigures = figures; vKind = kind;",
+        "#include <begin_vertex>\nvRest = rest; vState = state; vFigures = figures; vKind = kind; vBase = base;",
       );
     shader.fragmentShader =
       FRAGMENT_HEAD +

@@ -27,6 +27,7 @@ export class Model {
     const rest = fromGrid(arrays.rest, this.about.grid);
     this.base = { rest: arrays.rest, faces: arrays.faces, points: rest, count: rest.length / 3 };
     const { faces, count } = this.base;
+    this.baseColors = arrays.base ?? null;
     const open = openEdges(faces, count);
     this.onEdge = new Uint8Array(count);
     for (const corner of open) this.onEdge[faces[corner]] = 1;
@@ -140,6 +141,7 @@ export class Model {
     const [position, rest, normal] = [0, 1, 2].map(() => new Float32Array(3 * total));
     const [state, figures] = [new Uint8Array(4 * total), new Uint8Array(4 * total)];
     const kinds = new Uint8Array(total);
+    const base = this.baseColors && new Uint8Array(3 * total);
     const sources = new Uint32Array(total);
     const index = new Uint32Array(parts.reduce((sum, part) => sum + part.index.length, 0));
     let [at, corner] = [0, 0];
@@ -156,6 +158,7 @@ export class Model {
           rest[3 * at + axis] = this.base.points[3 * metal + axis];
           normal[3 * at + axis] = part.normals[3 * k + axis];
         }
+        if (base) base.set(this.baseColors.subarray(3 * metal, 3 * metal + 3), 3 * at);
         state.set([bytes.stain[v], bytes.dirt[metal], bytes.rust[metal], isBack ? 0 : 255], 4 * at);
         const open = isBack && part.kind === KIND.back ? bytes.open_back[v] : bytes.open_front[v];
         figures.set([bytes.adhesion[v], bytes.strain[v], bytes.risk?.[v] ?? 0, open], 4 * at);
@@ -168,6 +171,7 @@ export class Model {
     geometry.setAttribute("state", new BufferAttribute(state, 4, true));
     geometry.setAttribute("figures", new BufferAttribute(figures, 4, true));
     geometry.setAttribute("kind", new BufferAttribute(kinds, 1));
+    if (base) geometry.setAttribute("base", new BufferAttribute(base, 3, true));
     geometry.setIndex(new BufferAttribute(index, 1));
     geometry.userData.sources = sources;
     return geometry;

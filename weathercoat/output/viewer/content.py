@@ -63,10 +63,12 @@ def pack_run(
     *,
     untouched: Surface | None = None,
     risk: Mapping[int, Vectors] | None = None,
+    base: NDArray[np.uint8] | None = None,
 ) -> Content:
     """What a page shows of the snapshots of one run, one at least.
 
     untouched: parts without paint. risk: by step, the ratio of lift to adhesion of each vertex of the film.
+    base: the film's own colour over each vertex of the metal (n, 3), None where it shows its paint.
     Raises LimitError where the page would be too large for a browser, CorruptError where a film's faces are
     not those of its metal.
     """
@@ -87,6 +89,8 @@ def pack_run(
         "faces": len(first.substrate_faces),
         "ranges": {"adhesion": float(f"{adhesion:.6g}"), "strain": STRAIN_RANGE},
     }
+    if base is not None:
+        metal["base"] = (base, 3)
     if untouched is not None and len(untouched.faces):
         placed = normalise(untouched.vertices)
         box = Grid.around([placed])

@@ -18,6 +18,7 @@ from weathercoat import __version__
 from weathercoat.mesh.surface import Surface, Vectors
 from weathercoat.output.pictures import PictureParameters, frame_camera
 from weathercoat.output.shading import to_linear
+from weathercoat.output.viewer.base import base_colors
 from weathercoat.output.viewer.content import Content, pack_run
 from weathercoat.sim.snapshot import Snapshot
 
@@ -52,7 +53,8 @@ def write_page(
     from where it is seen at first. name: of the model. up, untouched: as of `render_snapshot`; risk: as of
     `pack_run`, which says what is raised. OSError where the page cannot be written.
     """
-    content = pack_run(snapshots, untouched=untouched, risk=risk)
+    base = base_colors(snapshots[0].surface, parameters.look, parameters.paint)
+    content = pack_run(snapshots, untouched=untouched, risk=risk, base=base)
     camera = frame_camera(snapshots[0], parameters, up=up, untouched=untouched)
     about = {
         **content.about,
