@@ -15,8 +15,12 @@ from PIL import Image
 from tests.output.textured import NODES, picture, write_gate
 from tests.output.validator import validate
 from weathercoat.config.load import load_config
-from weathercoat.mesh.formats.gltf_document import GltfDocument
+from weathercoat.export import ExportParameters, export_run
+from weathercoat.finished import open_run
+from weathercoat.mesh.formats.gltf_document import FLOATS, GltfDocument
+from weathercoat.mesh.materials import SourceMaterial, Texture
 from weathercoat.mesh.read import read_surface
+from weathercoat.output.glb import GlbBuffer, Material, MaterialTable
 from weathercoat.run import run_asset
 
 SETTINGS = [
@@ -130,3 +134,82 @@ def test_the_result_reads_back_as_a_model(gate: tuple[Path, Path]) -> None:
     base = next(m for m in surface.materials if m.name == "oak panel").base_texture
     assert base is not None
     assert Image.open(io.BytesIO(base.image)).size == (16, 16)
+
+
+@pytest.mark.parametrize(("formats", "lods"), [(("animation",), 0), (("glb",), 2)])
+def test_khronos_finds_nothing_wrong_in_exports(
+    gate: tuple[Path, Path], tmp_path: Path, formats: tuple[str, ...], lods: int
+) -> None:
+    if lods:
+        pytest.importorskip("pyfqmr")
+    model, snapshots = gate
+    parameters = ExportParameters(formats, steps=[0, 60], lods=lods, model=read_surface(model))
+    files = export_run(open_run(snapshots.parent), tmp_path, parameters)
+    assert len(files) == (6 if lods else 1)
+    for path in files:
+        issues = validate(path)
+        assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:5]
+
+
+def test_an_animation_shows_one_snapshot_at_a_time_and_stores_pictures_once(
+    gate: tuple[Path, Path], tmp_path: Path
+) -> None:
+    model, snapshots = gate
+    parameters = ExportParameters(("animation",), steps=[0, 60], model=read_surface(model))
+    (path,) = export_run(open_run(snapshots.parent), tmp_path, parameters)
+    document = GltfDocument(path.read_bytes(), None)
+    (animation,) = document.json["animations"]
+    scales = [
+        document.accessor(sampler["output"], ("VEC3",), FLOATS)[:, 0] for sampler in animation["samplers"]
+    ]
+    np.testing.assert_array_equal(np.sum(scales, axis=0), 1.0)
+    assert len(document.json["images"]) == 2
+    assert {"oak panel", "blue frame"} <= {material["name"] for material in document.json["materials"]}
+
+
+@pytest.mark.parametrize("kind", ["BMP", "TGA", "GIF", "TIFF"])
+def test_pictures_that_gltf_cannot_hold_become_png(kind: str) -> None:
+    """Material libraries of OBJ name such pictures; no extension of glTF allows them."""
+    pixels = np.arange(8 * 8 * 3, dtype=np.uint8).reshape(8, 8, 3)
+    source = Image.fromarray(pixels)
+    if kind == "GIF":
+        source = source.quantize(64)
+    stream = io.BytesIO()
+    source.save(stream, kind)
+    buffer, document = GlbBuffer(), dict[str, Any]()
+    table = MaterialTable(buffer)
+    table.number(textured_material(Texture(stream.getvalue(), "image/png", "skin")))
+    table.add_to(document)
+    assert not {"extensionsUsed", "extensionsRequired"} & set(document)
+    assert [image["mimeType"] for image in document["images"]] == ["image/png"]
+    with Image.open(io.BytesIO(buffer.pieces[0])) as shown:
+        assert shown.format == "PNG"
+        np.testing.assert_array_equal(np.asarray(shown.convert("RGB")), np.asarray(source.convert("RGB")))
+
+
+@pytest.mark.parametrize(
+    ("place", "is_kept"),
+    [
+        ({}, True),
+        ({"texCoord": 1}, False),
+        ({"extensions": {"KHR_texture_transform": {"texCoord": 1}}}, False),
+        ({"texCoord": 1, "extensions": {"KHR_texture_transform": {"texCoord": 0}}}, True),
+    ],
+)
+def test_textures_of_second_coordinates_go(place: dict[str, Any], is_kept: bool) -> None:
+    table = MaterialTable(GlbBuffer())
+    table.number(textured_material(Texture(picture((9, 8, 7)), "image/png"), place))
+    assert ("baseColorTexture" in table.entries[0]["pbrMetallicRoughness"]) is is_kept
+    assert "texCoord" not in str(table.entries[0])
+
+
+def test_a_picture_that_cannot_be_decoded_is_left_out() -> None:
+    table = MaterialTable(GlbBuffer())
+    table.number(textured_material(Texture(b"no picture", "image/png")))
+    assert table.entries[0]["pbrMetallicRoughness"] == {}
+    assert table.images == []
+
+
+def textured_material(texture: Texture, place: dict[str, Any] | None = None) -> Material:
+    entry = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, **(place or {})}}}
+    return Material("skin", 0.0, 1.0, True, source=SourceMaterial("skin", entry, (texture,)))

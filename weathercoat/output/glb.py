@@ -20,6 +20,7 @@ from weathercoat import __version__
 from weathercoat.mesh.formats.gltf_materials import texture_places
 from weathercoat.mesh.materials import SourceMaterial, Texture
 from weathercoat.mesh.surface import Indices, Vectors
+from weathercoat.output.textures import gltf_picture
 
 FLOAT, UINT32 = 5126, 5125
 VERTEX_TARGET, INDEX_TARGET = 34962, 34963
@@ -248,27 +249,34 @@ class MaterialTable:
             document["extensionsRequired"] = needed
 
     def _own(self, material: Material, source: SourceMaterial) -> dict[str, Any]:
-        """A material of the input; textures of other coordinates than the first, which are not kept, go."""
+        """A material of the input; textures of other coordinates than the first, which are not kept, go, and
+        so do those that cannot be decoded.
+        """
         entry: dict[str, Any] = deepcopy(dict(source.entry))
         for holder, key in list(texture_places(entry)):
-            if holder[key].get("texCoord", 0) != 0:
+            place = holder[key]
+            transform = place.get("extensions", {}).get("KHR_texture_transform", {})
+            coordinates = transform.pop("texCoord", place.pop("texCoord", 0))
+            picture = gltf_picture(source.textures[place["index"]].image)
+            if coordinates != 0 or picture is None:
                 del holder[key]
                 continue
-            holder[key]["index"] = self._texture(source.textures[holder[key]["index"]])
+            place["index"] = self._texture(source.textures[place["index"]], *picture)
         self.extensions.update(_extensions_of(entry))
         return {**entry, "name": material.name, "doubleSided": material.double_sided}
 
-    def _texture(self, texture: Texture) -> int:
-        if texture.image not in self._pictures:
-            self._pictures.append(texture.image)
-            view = self.buffer.add_bytes(texture.image)
+    def _texture(self, texture: Texture, image: bytes, mime: str) -> int:
+        """The number of a texture whose picture is given as glTF holds it."""
+        if image not in self._pictures:
+            self._pictures.append(image)
+            view = self.buffer.add_bytes(image)
             named = {"name": texture.name} if texture.name else {}
-            self.images.append({"bufferView": view, "mimeType": texture.mime, **named})
-        number = self._pictures.index(texture.image)
-        if texture.mime in ("image/png", "image/jpeg"):
+            self.images.append({"bufferView": view, "mimeType": mime, **named})
+        number = self._pictures.index(image)
+        if mime in ("image/png", "image/jpeg"):
             entry: dict[str, Any] = {"source": number}
         else:
-            name = f"EXT_texture_{texture.mime.rpartition('/')[2]}"
+            name = f"EXT_texture_{mime.rpartition('/')[2]}"
             self.extensions.add(name)
             entry = {"extensions": {name: {"source": number}}}
         if texture.sampler:

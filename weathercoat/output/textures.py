@@ -1,14 +1,46 @@
-"""Pictures of the model's materials as files, for formats that name them."""
+"""Pictures of the model's materials: as files, for formats that name them, and in formats that glTF holds."""
 
 from __future__ import annotations
 
 import mimetypes
 import re
+from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 
 from weathercoat.mesh.materials import Texture
 
 FOLDER = "textures"
+_KEPT = {"PNG": "image/png", "JPEG": "image/jpeg", "WEBP": "image/webp", "AVIF": "image/avif"}
+_PNG_MODES = ("1", "L", "LA", "I;16", "P", "RGB", "RGBA")
+_ALPHA_MODES = ("PA", "La", "RGBa")
+
+
+@lru_cache(maxsize=16)  # a run writes the same few pictures again and again
+def gltf_picture(image: bytes) -> tuple[bytes, str] | None:
+    """A picture as glTF 2.0 and its extensions can hold it, with its MIME type; None where it cannot be
+    decoded.
+
+    Told by the content, since names of files mislead. PNG, JPEG, WebP and AVIF keep their bytes; others, such
+    as BMP and TGA of OBJ's material libraries, become PNG.
+    """
+    from PIL import Image
+
+    if image[4:12] == b"ftypavif":  # not all builds of Pillow know it
+        return image, _KEPT["AVIF"]
+    try:
+        with Image.open(BytesIO(image)) as opened:
+            if opened.format in _KEPT:
+                return image, _KEPT[opened.format]
+            mode = opened.mode
+            if mode not in _PNG_MODES:
+                mode = "RGBA" if mode in _ALPHA_MODES else "RGB"
+            pixels = opened if mode == opened.mode else opened.convert(mode)
+            stream = BytesIO()
+            pixels.save(stream, "PNG")
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        return None
+    return stream.getvalue(), _KEPT["PNG"]
 
 
 class PictureFolder:
